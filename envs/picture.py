@@ -1,0 +1,206 @@
+"""A still picture of a probing episode: the object, the finger's rays, what it felt, the rivals.
+
+`draw` asks MuJoCo's offscreen renderer first, in a process of its own, because a missing or broken
+GL library may kill the process that tries it; matplotlib draws the same scene where that fails.
+All lengths are metres, all coordinates are in the world frame, z points up.
+"""
+
+from __future__ import annotations
+
+import ctypes.util
+import os
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+if TYPE_CHECKING:
+    from PIL.Image import Image
+
+__all__ = ["Ghost", "PictureScene", "draw", "renderer_note"]
+
+GL_SECONDS = 20.0
+"""A renderer that has not answered by then is given up: software GL needs about two."""
+
+
+@dataclass(frozen=True, eq=False)
+class Ghost:
+    """A rival: an object at a pose that the contacts allow.
+
+    Attributes:
+        vertices_world: ``(v, 3)`` float64.
+        triangles: ``(t, 3)`` int64 indices, counter-clockwise seen from outside.
+        label: its line in the legend; ghosts of one label share a line and a colour.
+    """
+
+    vertices_world: NDArray[np.float64]
+    triangles: NDArray[np.int64]
+    label: str
+
+    def __post_init__(self) -> None:
+        _coerce(self, "vertices_world", np.float64, (3,))
+        _coerce(self, "triangles", np.int64, (3,))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PictureScene:
+    """Everything that a picture shows.
+
+    Attributes:
+        object_vertices_world: ``(v, 3)`` float64, the object as it truly lies.
+        object_triangles: ``(t, 3)`` int64 indices, counter-clockwise seen from outside.
+        object_edges_world: ``(e, 2, 3)`` outline segments of the planar faces; may be empty.
+        rays_world: ``(r, 2, 3)`` start and end of each ray that the finger took.
+        ray_hits: ``(r,)`` bool, whether the ray ended on the object.
+        contacts_world: ``(n, 3)`` measured positions.
+        normals_world: ``(n, 3)`` measured outward unit normals.
+        ghosts: the rivals, drawn translucent.
+        plane_height: z of the support plane. The object may reach below it.
+        title: one line, large.
+        subtitle: one line below it.
+
+    Raises:
+        ValueError: an array has another shape, or arrays that belong together differ in length.
+    """
+
+    object_vertices_world: NDArray[np.float64]
+    object_triangles: NDArray[np.int64]
+    object_edges_world: NDArray[np.float64]
+    rays_world: NDArray[np.float64]
+    ray_hits: NDArray[np.bool_]
+    contacts_world: NDArray[np.float64]
+    normals_world: NDArray[np.float64]
+    ghosts: tuple[Ghost, ...] = ()
+    plane_height: float = 0.0
+    title: str = ""
+    subtitle: str = ""
+
+    def __post_init__(self) -> None:
+        _coerce(self, "object_vertices_world", np.float64, (3,))
+        _coerce(self, "object_triangles", np.int64, (3,))
+        _coerce(self, "object_edges_world", np.float64, (2, 3))
+        _coerce(self, "rays_world", np.float64, (2, 3))
+        _coerce(self, "ray_hits", np.bool_, ())
+        _coerce(self, "contacts_world", np.float64, (3,))
+        _coerce(self, "normals_world", np.float64, (3,))
+        for one, other in (("rays_world", "ray_hits"), ("contacts_world", "normals_world")):
+            lengths = len(getattr(self, one)), len(getattr(self, other))
+            if lengths[0] != lengths[1]:
+                raise ValueError(f"{one} has {lengths[0]} rows but {other} has {lengths[1]}")
+        if not len(self.object_vertices_world):
+            raise ValueError("object_vertices_world is empty: there is nothing to draw")
+
+
+def draw(scene: PictureScene, path: str | Path, size: tuple[int, int] = (1280, 960)) -> str:
+    """Draw ``scene`` as a PNG of ``size`` (width, height) pixels.
+
+    The file appears whole or not at all. ``MUJOCO_GL`` is respected where it is set.
+
+    Returns:
+        Who drew it: ``"MuJoCo"`` or ``"matplotlib"``.
+
+    Raises:
+        ValueError: ``path`` does not end in ``.png``, or its folder does not exist.
+    """
+    path = Path(path)
+    if path.suffix.lower() != ".png":
+        raise ValueError(f"a picture is a PNG: {str(path)!r} should end in .png")
+    if not path.parent.is_dir():
+        raise ValueError(f"the picture {str(path)!r} cannot be written: its folder does not exist")
+    from .picture_caption import add_caption
+
+    image, renderer = _draw_with_gl(scene, size), "MuJoCo"
+    if image is None:
+        from .picture_plot import draw_plot
+
+        image, renderer = draw_plot(scene, size), "matplotlib"
+    _save_whole(add_caption(image, scene), path)
+    return renderer
+
+
+def renderer_note(renderer: str) -> str:
+    """What a command should tell about `draw`'s answer; empty where there is nothing to tell."""
+    if renderer == "MuJoCo":
+        return ""
+    return f"no GL library was found that works: the picture was drawn by {renderer}"
+
+
+def save_scene(scene: PictureScene, path: Path) -> None:
+    """Write ``scene`` as an ``.npz`` that `load_scene` reads."""
+    fields = {name: getattr(scene, name) for name in scene.__dataclass_fields__ if name != "ghosts"}
+    for i, ghost in enumerate(scene.ghosts):
+        fields[f"ghost_{i}_vertices"] = ghost.vertices_world
+        fields[f"ghost_{i}_triangles"] = ghost.triangles
+    np.savez(path, labels=np.array([g.label for g in scene.ghosts], dtype=np.str_), **fields)
+
+
+def load_scene(path: Path) -> PictureScene:
+    """Read what `save_scene` wrote."""
+    with np.load(path, allow_pickle=False) as file:
+        ghosts = tuple(
+            Ghost(file[f"ghost_{i}_vertices"], file[f"ghost_{i}_triangles"], str(label))
+            for i, label in enumerate(file["labels"])
+        )
+        arrays = {name: file[name] for name in PictureScene.__dataclass_fields__ if name in file}
+    for name, kind in (("plane_height", float), ("title", str), ("subtitle", str)):
+        arrays[name] = kind(arrays[name])
+    return PictureScene(**arrays, ghosts=ghosts)
+
+
+def _draw_with_gl(scene: PictureScene, size: tuple[int, int]) -> Image | None:
+    """The picture without its captions, or None where no GL library draws it."""
+    from PIL import Image
+
+    with tempfile.TemporaryDirectory(prefix="palpate-") as folder:
+        scene_path, image_path = Path(folder, "scene.npz"), Path(folder, "image.png")
+        save_scene(scene, scene_path)
+        # -P: the folder that the user happens to stand in must not hide a module.
+        command = [sys.executable, "-P", "-m", "palpate.envs.picture_gl"]
+        command += [str(scene_path), str(image_path), *map(str, size)]
+        for environment in _gl_environments():
+            try:
+                subprocess.run(
+                    command, env=environment, capture_output=True, timeout=GL_SECONDS, check=True
+                )
+                with Image.open(image_path) as image:
+                    return image.convert("RGB")
+            except (subprocess.SubprocessError, OSError):
+                continue
+    return None
+
+
+def _gl_environments() -> list[dict[str, str]]:
+    """The environments to try MuJoCo's renderer in, best first."""
+    if os.environ.get("MUJOCO_GL") or sys.platform != "linux":
+        return [dict(os.environ)]
+    names = [("egl", "EGL"), ("osmesa", "OSMesa")]
+    found = [name for name, library in names if ctypes.util.find_library(library)]
+    if os.environ.get("DISPLAY"):
+        found.append("glfw")
+    return [{**os.environ, "MUJOCO_GL": name} for name in found]
+
+
+def _save_whole(image: Image, path: Path) -> None:
+    """Write under a temporary name beside ``path`` and rename, so that no half picture is left."""
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        image.save(part, format="PNG")
+        part.replace(path)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def _coerce(owner: object, name: str, dtype: type, row_shape: tuple[int, ...]) -> None:
+    value: ArrayLike = getattr(owner, name)
+    array = np.ascontiguousarray(value, dtype=dtype)
+    if array.size == 0:
+        array = array.reshape(0, *row_shape)
+    if array.ndim != 1 + len(row_shape) or array.shape[1:] != row_shape:
+        wanted = ", ".join(["n", *map(str, row_shape)])
+        raise ValueError(f"{name} has shape {array.shape}, not ({wanted})")
+    object.__setattr__(owner, name, array)

@@ -1,0 +1,221 @@
+"""`palpate/Probe-v0`: find out by touch which object lies here, and how."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+from scipy.spatial.transform import RigidTransform
+
+from ..recognizer import Belief, Contacts, PoseTolerance, Recognizer, SearchLimits
+from .library import LibrarySource, load_library
+from .observation import Observation, ObservationLayout
+from .scene import Placement, ProbeScene
+from .sensor import RaySensor, SensorNoise, Touch
+
+INCH = 0.0254
+REACH = 2.0
+"""Rays start this many diameters of the largest object before the point where they meet."""
+
+
+class ProbeEnv(gymnasium.Env[Observation, NDArray[np.float64]]):
+    """An unknown object of a known library is touched until one hypothesis is left.
+
+    ## Description
+    One object of the library is held at an unknown pose, any orientation, across the support plane
+    ``z = 0``. A probe sends a triad of mutually orthogonal rays, all pointing downwards, that meet
+    at a point (x, y, 0) of the plane; each reports where it first meets the object, with the
+    outward normal there, or that it reached the plane. After each probe the recogniser says which
+    hypotheses (object and pose) the contacts so far allow.
+
+    ## Action Space
+    `Box(-1, 1, (3,))`, float64:
+
+    | number | meaning | -1 | 1 |
+    |---|---|---|---|
+    | 0 | x of the meeting point | -half width | half width |
+    | 1 | y of the meeting point | -half width | half width |
+    | 2 | yaw of the triad | -60 degrees | 60 degrees |
+
+    The half width is half the diameter of the library's largest object (`env.half_width`).
+
+    ## Observation Space
+    A `Dict` of `Box`es. R is 3 `max_probes`, H is `hypotheses_shown`; unused rows are zero.
+
+    | key | shape | meaning |
+    |---|---|---|
+    | contact_count | (1,) | contacts on the object so far, n |
+    | contact_positions | (R, 3) | first n rows: positions, world, metres |
+    | contact_normals | (R, 3) | first n rows: outward unit normals, world |
+    | contact_position_error | (R,) | bounds on them, metres |
+    | contact_normal_error | (R,) | bounds on them, radians |
+    | ray_count | (1,) | rays sent so far |
+    | ray_starts, ray_ends | (R, 3) | segments swept, metres |
+    | ray_outcomes | (R,) | 1 object, 2 plane, 3 nothing; 0 not sent |
+    | hypothesis_count | (1,) | hypotheses left; 0 also before the first contact |
+    | hypothesis_objects | (H,) | index into the library, heaviest first; -1 none |
+    | hypothesis_positions | (H, 3) | origin of the model in the world, metres |
+    | hypothesis_quaternions | (H, 4) | rotation model to world (x, y, z, w) |
+    | hypothesis_weights | (H,) | shares of the belief |
+    | hypothesis_determined | (H,) | 1 if the contacts fix all six freedoms |
+    | interpretation_count | (1,) | interpretations left |
+
+    ## Rewards
+    -1 a probe.
+
+    ## Starting State
+    The object is drawn from the library; its orientation is uniform, 10 to 50 % of its height are
+    below the plane, and its centroid lies within a fifth of the half width of the origin.
+
+    ## Episode End
+    Terminated when one hypothesis is left, up to the object's symmetry and with its pose fixed, or
+    none. Truncated after `max_probes`.
+
+    ## Info
+    `truth`, for scoring alone: `object` (name) and `pose` (4, 4), model to world.
+
+    ## Arguments
+    | name | default | meaning |
+    |---|---|---|
+    | library | None | names of stand-ins, ready models, or a folder of meshes; None: all stand-ins |
+    | object_name | None | always this object; None: drawn at reset |
+    | position_error | 0.000254 | bound on positions, metres (0.01 in) |
+    | normal_error | pi / 10 | bound on normals, radians |
+    | max_probes | 40 | probes before truncation |
+    | hypotheses_shown | 16 | hypotheses in the observation |
+    | tolerance | None | which poses count as the same |
+    | limits | None | how far the recogniser searches |
+
+    ## References
+    W. E. L. Grimson and T. Lozano-Perez, MIT AI Memo 738, 1983, Section 4.4.
+
+    ## Version History
+    * v0: initial version.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {"render_modes": []}
+
+    def __init__(
+        self,
+        library: LibrarySource = None,
+        *,
+        object_name: str | None = None,
+        position_error: float = 0.01 * INCH,
+        normal_error: float = np.pi / 10.0,
+        max_probes: int = 40,
+        hypotheses_shown: int = 16,
+        tolerance: PoseTolerance | None = None,
+        limits: SearchLimits | None = None,
+    ) -> None:
+        """See the class for the arguments.
+
+        Raises:
+            ValueError: an unknown object, a library that can't be loaded, a bound that isn't
+                positive, or fewer than one probe or hypothesis.
+        """
+        for name, value in (("max_probes", max_probes), ("hypotheses_shown", hypotheses_shown)):
+            if value < 1:
+                raise ValueError(f"{name} is {value}; it must be at least 1")
+        noise = SensorNoise(position_error=position_error, normal_error=normal_error)
+        self.library = load_library(library)
+        self._index = {model.name: row for row, model in enumerate(self.library)}
+        if object_name is not None and object_name not in self._index:
+            known = ", ".join(self._index)
+            raise ValueError(f"no object is called {object_name!r}; the library has: {known}")
+        self._object_name = object_name
+        self._recognizer = Recognizer(self.library, tolerance=tolerance, limits=limits)
+        largest = max(model.diameter for model in self.library)
+        self.half_width = largest / 2.0
+        self._placement = Placement(offset=0.2 * self.half_width)
+        self._sensor = RaySensor(noise, REACH * largest)
+        self._scenes: dict[str, ProbeScene] = {}
+        self._max_probes = max_probes
+        self._layout = ObservationLayout(
+            rays=3 * max_probes,
+            hypotheses=hypotheses_shown,
+            objects=len(self.library),
+            extent=2.0 * REACH * largest + position_error,
+        )
+        self.observation_space = self._layout.space()
+        self.action_space = spaces.Box(-1.0, 1.0, (3,), np.float64)
+        self._scene: ProbeScene | None = None
+        self._contacts = Contacts.none()
+        self._touches: list[Touch] = []
+        self._belief: Belief | None = None
+
+    @property
+    def belief(self) -> Belief | None:
+        """What the recogniser makes of the contacts so far; None before the first contact."""
+        return self._belief
+
+    @property
+    def contacts(self) -> Contacts:
+        """All contacts so far."""
+        return self._contacts
+
+    @property
+    def touches(self) -> tuple[Touch, ...]:
+        """What each probe reported."""
+        return tuple(self._touches)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Observation, dict[str, Any]]:
+        """Place a new object; ``options`` are not used."""
+        super().reset(seed=seed)
+        rng = self.np_random
+        drawn = self.library[int(rng.integers(len(self.library)))].name
+        name = self._object_name or drawn
+        if name not in self._scenes:
+            self._scenes[name] = ProbeScene(self.library[self._index[name]])
+        self._scene = self._scenes[name]
+        self._scene.place(self._placement.draw(rng, self._scene.model))
+        self._contacts = Contacts.none()
+        self._touches = []
+        self._belief = None
+        return self._observe(), self._info()
+
+    def step(
+        self, action: NDArray[np.float64]
+    ) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
+        """Send one triad; actions beyond the box are clipped to it.
+
+        Raises:
+            ValueError: an action of the wrong shape or that isn't finite.
+            gymnasium.error.ResetNeeded: before the first reset.
+        """
+        if self._scene is None:
+            raise gymnasium.error.ResetNeeded("call reset before step")
+        wanted = np.asarray(action, np.float64)
+        if wanted.shape != (3,) or not np.isfinite(wanted).all():
+            raise ValueError(f"an action is three finite numbers, not {action!r}")
+        x, y, yaw = np.clip(wanted, -1.0, 1.0) * (self.half_width, self.half_width, np.pi / 3.0)
+        touch = self._sensor.touch(self._scene, x, y, yaw, self.np_random)
+        self._touches.append(touch)
+        if len(touch.contacts):
+            self._contacts = Contacts.join([self._contacts, touch.contacts])
+            self._belief = self._recognizer.recognize(self._contacts)
+        ended = self._belief is not None and (self._belief.unique or self._belief.empty)
+        truncated = len(self._touches) >= self._max_probes
+        return self._observe(), -1.0, ended, truncated, self._info()
+
+    @property
+    def T_world_object(self) -> RigidTransform:
+        """Where the object truly is; for scoring alone."""
+        if self._scene is None:
+            raise gymnasium.error.ResetNeeded("call reset first")
+        return self._scene.T_world_object
+
+    def _observe(self) -> Observation:
+        # Past max_probes an episode may be stepped on; the observation keeps its last rows.
+        touches = self._touches[-self._max_probes :]
+        contacts = self._contacts[slice(-3 * self._max_probes, None)]
+        return self._layout.pack(contacts, touches, self._belief, self._index)
+
+    def _info(self) -> dict[str, Any]:
+        assert self._scene is not None
+        pose = self._scene.T_world_object.as_matrix()
+        return {"truth": {"object": self._scene.model.name, "pose": pose}}

@@ -1,0 +1,117 @@
+"""Hypotheses: interpretations that place the object alike are one (memo, end of Section 3).
+
+The memo counts poses by the direction of their rotation axis, which is singular near angles 0 and
+pi; here two poses are compared by the angle of the rotation between them and by the distance of
+their centroids, up to the object's own symmetries.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import RigidTransform, Rotation
+
+from .hypothesis_kernels import group_poses
+from .polyhedron import Polyhedron
+from .pose import Poses
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class PoseTolerance:
+    """When two poses count as the same."""
+
+    rotation: float = np.radians(3.0)
+    """Largest rotation between them, radians."""
+    translation: float = 0.02
+    """Largest distance between their centroids, as a share of the object's diameter, ..."""
+    position_errors: float = 2.0
+    """... or this many bounds on position, whichever is more."""
+
+    def __post_init__(self) -> None:
+        for name in ("rotation", "translation", "position_errors"):
+            if not getattr(self, name) > 0.0:
+                raise ValueError(f"{name} is {getattr(self, name)}; it must be above zero")
+
+    def distance(self, diameter: float, position_error: float) -> float:
+        """Largest distance between centroids, metres."""
+        return max(self.translation * diameter, self.position_errors * position_error)
+
+
+@dataclass(frozen=True, eq=False)
+class Hypothesis:
+    """An object at a pose, as some interpretations of the contacts have it."""
+
+    object_name: str
+    pose: RigidTransform
+    """Model to world, ``T_world_object``; the best fit among its interpretations. Of poses that
+    differ by a symmetry of the object only one is reported."""
+    weight: float
+    """Share of the belief, between 0 and 1."""
+    interpretations: NDArray[np.int32]
+    """(k, n) a face of the object for each contact, best fit first."""
+    freedoms: Floats
+    """(d, 6) motions that the contacts leave open beyond the pose tolerance, d = 0 if none:
+    orthonormal rows of rotation about the centroid (times half the diameter) and shift, in the
+    object's frame. Along them ``pose`` is one example of many."""
+
+    @property
+    def determined(self) -> bool:
+        """Whether the contacts fix all six freedoms."""
+        return len(self.freedoms) == 0
+
+
+def cluster(
+    model: Polyhedron, poses: Poses, tolerance: PoseTolerance, position_error: float
+) -> tuple[list[Hypothesis], Floats]:
+    """Group one object's poses into hypotheses.
+
+    The weight of a group is the volume of poses it stands for: every pose within the bounds is
+    equally likely under noise uniform in them and a uniform prior. The volume is approximated
+    locally, by the error ellipsoid of the group's best-determined fit, cut to half a turn and half
+    a diameter along what is open; it counts once a symmetry of the object.
+
+    Args:
+        model: the object.
+        poses: its surviving interpretations.
+        tolerance: which poses count as the same.
+        position_error: the largest bound on a position, metres.
+
+    Returns:
+        Hypotheses, and (h,) the logarithms of their weights, not yet normalised.
+    """
+    if not len(poses):
+        return [], np.zeros(0)
+    poses = poses.take(np.lexsort((poses.costs, ~poses.proven)))
+    radius = model.diameter / 2.0
+    most_shift = tolerance.distance(model.diameter, position_error)
+    centres = poses.translations + poses.rotations @ model.centroid
+    groups = group_poses(
+        poses.rotations, centres, model.symmetries, tolerance.rotation, most_shift
+    )
+    leaders = np.unique(groups, return_index=True)[1]
+    prior = np.diag([1.0 / (np.pi * radius)] * 3 + [1.0 / radius] * 3) ** 2
+    variances, motions = np.linalg.eigh(np.linalg.inv(poses.informations + prior))
+    log_volumes = 0.5 * np.log(variances).sum(axis=1) + np.log(len(model.symmetries))
+    # Two standard deviations of each motion, against what the tolerance allows it.
+    allowed = min(tolerance.rotation * radius, most_shift)
+    hypotheses, log_weights = [], np.empty(len(leaders))
+    for group, leader in enumerate(leaders):
+        members = np.flatnonzero(groups == group)
+        open_motions = 2.0 * np.sqrt(variances[leader]) > allowed
+        hypotheses.append(
+            Hypothesis(
+                object_name=model.name,
+                pose=RigidTransform.from_components(
+                    poses.translations[leader], Rotation.from_matrix(poses.rotations[leader])
+                ),
+                weight=1.0,
+                interpretations=poses.faces[members],
+                freedoms=motions[leader].T[open_motions],
+            )
+        )
+        log_weights[group] = log_volumes[members].max()
+    return hypotheses, log_weights

@@ -1,0 +1,34 @@
+"""Libraries of models read from a folder."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from .polyhedron import Polyhedron
+
+MESH_ENDINGS = (".obj", ".off", ".ply", ".stl")
+"""File name endings that count as meshes."""
+
+
+def load_folder(folder: str | os.PathLike[str]) -> tuple[Polyhedron, ...]:
+    """Read every mesh of a folder, in alphabetical order, each named after its file.
+
+    Args:
+        folder: a folder with closed meshes in metres.
+
+    Raises:
+        ValueError: no such folder, no mesh in it, two meshes of one name, or a mesh that is no
+            closed polyhedron.
+    """
+    path = Path(folder)
+    if not path.is_dir():
+        raise ValueError(f"{path}: no such folder")
+    files = sorted(file for file in path.iterdir() if file.suffix.lower() in MESH_ENDINGS)
+    if not files:
+        raise ValueError(f"{path}: no mesh in this folder; expected files {', '.join(MESH_ENDINGS)}")
+    names = [file.stem for file in files]
+    for file in files:
+        if names.count(file.stem) > 1:
+            raise ValueError(f"{file}: another mesh in its folder is called {file.stem!r} too")
+    return tuple(Polyhedron.from_mesh(file) for file in files)

@@ -1,0 +1,259 @@
+"""A model: a closed polyhedron as planar faces, with its own rotational symmetries."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.distance import pdist
+
+from .faces import convex_hull_in_plane, convex_pieces, edge_neighbours, group_coplanar, plane_of
+from .symmetry import FaceSummary, rotational_symmetries
+
+if TYPE_CHECKING:
+    import trimesh
+
+MOST_FACES = 1000
+"""Tables grow with the square of the number of faces; above this a mesh is hardly a polyhedron."""
+
+
+@dataclass(frozen=True, eq=False)
+class FacePolygons:
+    """Planar polygons of all faces in flat arrays, as the compiled kernels read them.
+
+    Face ``f`` owns polygons ``first[f]`` to ``first[f + 1]``; polygon ``k`` owns corners
+    ``start[k]`` to ``start[k + 1]``, counter-clockwise about the outward normal.
+    """
+
+    first: NDArray[np.int64]
+    """(f + 1,) the first polygon of each face."""
+    start: NDArray[np.int64]
+    """(p + 1,) the first corner of each polygon."""
+    corners: NDArray[np.float64]
+    """(c, 3) corners, object frame, metres."""
+
+    @classmethod
+    def of(cls, polygons: list[list[NDArray[np.float64]]]) -> FacePolygons:
+        """Flatten a list of polygons a face."""
+        flat = [polygon for face in polygons for polygon in face]
+        return cls(
+            first=np.cumsum([0, *map(len, polygons)], dtype=np.int64),
+            start=np.cumsum([0, *map(len, flat)], dtype=np.int64),
+            corners=np.ascontiguousarray(np.concatenate(flat)),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Polyhedron:
+    """A model of the library: planar faces with outward normals, in its own frame, metres.
+
+    Build one with `from_mesh`. Faces may be concave and may have holes; coplanar faces that
+    don't touch are faces of their own.
+    """
+
+    name: str
+    vertices: NDArray[np.float64]
+    """(v, 3) corners of the mesh."""
+    triangles: NDArray[np.int64]
+    """(t, 3) vertex indices, counter-clockwise seen from outside."""
+    triangle_faces: NDArray[np.int64]
+    """(t,) the planar face of each triangle."""
+    normals: NDArray[np.float64]
+    """(f, 3) outward unit normals."""
+    offsets: NDArray[np.float64]
+    """(f,) ``normal . x`` of each face's plane."""
+    areas: NDArray[np.float64]
+    """(f,) face areas, square metres."""
+    hulls: FacePolygons
+    """The convex hull of each face: one polygon a face."""
+    pieces: FacePolygons
+    """Convex polygons whose union is the face."""
+
+    @property
+    def face_count(self) -> int:
+        """How many planar faces there are."""
+        return len(self.normals)
+
+    @cached_property
+    def diameter(self) -> float:
+        """The largest distance between two corners, metres."""
+        return float(pdist(self.vertices).max())
+
+    @cached_property
+    def centroid(self) -> NDArray[np.float64]:
+        """(3,) the centre of the enclosed volume, object frame."""
+        corners = self.vertices[self.triangles]
+        volumes = np.linalg.det(corners)
+        return (volumes[:, None] * corners.sum(axis=1)).sum(axis=0) / (4.0 * volumes.sum())
+
+    @cached_property
+    def edges(self) -> NDArray[np.float64]:
+        """(e, 2, 3) the segments where two faces meet, object frame."""
+        pairs = edge_neighbours(self.triangles)
+        between = self.triangle_faces[pairs[:, 0]] != self.triangle_faces[pairs[:, 1]]
+        return self.vertices[pairs[between, 2:]]
+
+    @cached_property
+    def symmetries(self) -> NDArray[np.float64]:
+        """(g, 3, 3) the proper rotations about `centroid` that map the solid onto itself.
+
+        The identity comes first.
+        """
+        corners, summaries = [], []
+        for face in range(self.face_count):
+            triangles = self.triangles[self.triangle_faces == face]
+            corners.append(np.unique(triangles))
+            weights = _doubled_areas(self.vertices, triangles)
+            middle = weights @ self.vertices[triangles].mean(axis=1) / weights.sum()
+            summaries.append(middle - self.centroid)
+        # A corner of the solid is where three faces meet; a mesh may have more vertices.
+        meets = np.bincount(np.concatenate(corners), minlength=len(self.vertices))
+        summary = FaceSummary(
+            normals=self.normals,
+            offsets=self.offsets - self.normals @ self.centroid,
+            areas=self.areas,
+            middles=np.array(summaries),
+        )
+        solid_corners = self.vertices[meets >= 3] - self.centroid
+        return rotational_symmetries(summary, solid_corners, self.diameter)
+
+    @classmethod
+    def from_mesh(
+        cls, mesh: trimesh.Trimesh | str | os.PathLike[str], *, name: str | None = None
+    ) -> Polyhedron:
+        """Read planar faces off a closed mesh.
+
+        Args:
+            mesh: a trimesh mesh, or the path of a mesh file that trimesh reads (STL, OBJ, PLY,
+                OFF, ...); coordinates are metres.
+            name: what to call the model; by default the file's name without its ending.
+
+        Raises:
+            ValueError: a file that is missing or can't be read, a mesh that isn't closed, that
+                encloses no volume, or that has more than `MOST_FACES` planar faces.
+
+        Warns:
+            UserWarning: the winding was inverted or inconsistent and has been mended.
+        """
+        vertices, triangles, label = _read(mesh)
+        name = name or label
+        try:
+            return cls._from_triangles(vertices, triangles, name)
+        except ValueError as error:
+            raise ValueError(f"{label}: {error}") from error
+
+    @classmethod
+    def _from_triangles(
+        cls, vertices: NDArray[np.float64], triangles: NDArray[np.int64], name: str
+    ) -> Polyhedron:
+        if len(triangles) < 4:
+            raise ValueError(f"{len(triangles)} triangles can't enclose a volume")
+        bad = np.flatnonzero(~np.isfinite(vertices).all(axis=1))
+        if bad.size:
+            raise ValueError(f"vertex {bad[0]} is {vertices[bad[0]].tolist()}; it must be finite")
+        edge_neighbours(triangles)
+        triangles = _outward(vertices, triangles, name)
+        owner = group_coplanar(vertices, triangles)
+        count = int(owner.max()) + 1
+        if count > MOST_FACES:
+            raise ValueError(
+                f"{count} planar faces, and {MOST_FACES} is the most;"
+                " is this a curved surface? A coarser mesh of it would do"
+            )
+        normals, offsets = np.empty((count, 3)), np.empty(count)
+        areas = np.empty(count)
+        hulls, pieces = [], []
+        for face in range(count):
+            members = triangles[owner == face]
+            corners = vertices[np.unique(members)]
+            try:
+                normals[face], offsets[face] = plane_of(corners, members, vertices)
+            except ValueError as error:
+                raise ValueError(f"face {face}: {error}") from error
+            areas[face] = _doubled_areas(vertices, members).sum() / 2.0
+            hulls.append([convex_hull_in_plane(corners, normals[face])])
+            pieces.append(convex_pieces(vertices, members, normals[face]))
+        return cls(
+            name=name,
+            vertices=vertices,
+            triangles=triangles,
+            triangle_faces=owner,
+            normals=normals,
+            offsets=offsets,
+            areas=areas,
+            hulls=FacePolygons.of(hulls),
+            pieces=FacePolygons.of(pieces),
+        )
+
+
+def _doubled_areas(
+    vertices: NDArray[np.float64], triangles: NDArray[np.int64]
+) -> NDArray[np.float64]:
+    corners = vertices[triangles]
+    sides = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return np.linalg.norm(sides, axis=1)
+
+
+def _read(
+    mesh: trimesh.Trimesh | str | os.PathLike[str],
+) -> tuple[NDArray[np.float64], NDArray[np.int64], str]:
+    """Merged vertices, triangles and a label for messages."""
+    import trimesh  # a second of import time that a caller with ready models does not need
+
+    label = "mesh"
+    if isinstance(mesh, trimesh.Trimesh):
+        loaded = mesh.copy()
+    elif isinstance(mesh, str | os.PathLike):
+        path = Path(mesh)
+        label = path.stem
+        if not path.is_file():
+            raise ValueError(f"{path}: no such mesh file")
+        try:
+            loaded = trimesh.load_mesh(path, process=False)
+        except Exception as error:  # trimesh raises whatever its parsers raise
+            raise ValueError(f"{path}: not a mesh that can be read ({error})") from error
+        if not isinstance(loaded, trimesh.Trimesh):
+            raise ValueError(f"{path}: holds no triangle mesh")
+    else:
+        raise ValueError(f"a mesh must be a trimesh.Trimesh or a path, not {type(mesh).__name__}")
+    loaded.merge_vertices(merge_tex=True, merge_norm=True)
+    triangles = np.asarray(loaded.faces, dtype=np.int64).reshape(-1, 3)
+    distinct = (np.diff(np.sort(triangles, axis=1), axis=1) > 0).all(axis=1)
+    triangles = triangles[distinct]
+    used, triangles = np.unique(triangles, return_inverse=True)
+    vertices = np.array(loaded.vertices, dtype=np.float64, order="C")[used]
+    return vertices, np.ascontiguousarray(triangles.reshape(-1, 3)), label
+
+
+def _outward(
+    vertices: NDArray[np.float64], triangles: NDArray[np.int64], name: str
+) -> NDArray[np.int64]:
+    """The triangles, all counter-clockwise seen from outside; says so where it had to mend."""
+    pairs = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, 1:], triangles[:, [2, 0]]]))
+    directed = np.concatenate([triangles[:, [0, 1]], triangles[:, 1:], triangles[:, [2, 0]]])
+    if len(np.unique(directed, axis=0)) != len(pairs):
+        import trimesh
+
+        mended = trimesh.Trimesh(vertices, triangles, process=False)
+        trimesh.repair.fix_winding(mended)
+        triangles = np.asarray(mended.faces, dtype=np.int64)
+        warnings.warn(f"{name}: its winding was inconsistent; mended", UserWarning, stacklevel=5)
+    corners = vertices[triangles]
+    size = float(np.ptp(vertices, axis=0).max())
+    volume = float(np.linalg.det(corners - vertices.mean(axis=0)).sum()) / 6.0
+    if abs(volume) < 1e-9 * size**3:
+        raise ValueError(f"it encloses no volume ({volume:.3g} cubic metres)")
+    if volume < 0.0:
+        triangles = triangles[:, ::-1]
+        warnings.warn(
+            f"{name}: its winding was inverted (normals pointed inwards); mended",
+            UserWarning,
+            stacklevel=5,
+        )
+    return np.ascontiguousarray(triangles)

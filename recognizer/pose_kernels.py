@@ -1,0 +1,126 @@
+"""Compiled model test: from interpretations to poses and verdicts."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from .branch_kernels import (
+    FEASIBLE,
+    REJECTED,
+    UNDECIDED,
+    align,
+    middle_translation,
+    rotation_at,
+    search_poses,
+)
+from .feasibility_kernels import EXACT, seek_feasible, worst_excess
+from .fit_kernels import assemble_fit, fit_pose
+from .motion_kernels import to_object
+
+MOST_FIT_STEPS = 20
+NEAR_MISS = 1e9
+"""Excess of a fitted pose up to which nudging it inside the bounds is tried before all else."""
+
+
+@njit(cache=True)
+def _meets(faces, contacts, model, rotation, translation, x, u):
+    points, measured, reaches, chords = contacts
+    to_object(points, measured, rotation, translation, x, u)
+    worst, _ = worst_excess(x, u, faces, faces, reaches, chords, model, True)
+    return worst
+
+
+@njit(cache=True)
+def test_interpretations(
+    interpretations, points, measured, position_error, normal_error, model, middles, most_boxes
+):
+    """Fit a pose to each interpretation and test whether its bounds can be met.
+
+    Args:
+        interpretations: (m, n) a face for each contact.
+        points: (n, 3) positions, world frame, metres.
+        measured: (n, 3) normals, world frame.
+        position_error: (n,) bounds, metres.
+        normal_error: (n,) bounds, radians.
+        model: face normals (f, 3); plane offsets (f,); (f + 1,) the first convex piece of each
+            face; (p + 1,) the first corner of each polygon, of which the first f are the faces'
+            hulls and the rest their pieces; corners (c, 3); centroid (3,); radius. Object frame.
+        middles: (f, 3) a point inside each face's hull.
+        most_boxes: the most boxes of rotations to look at an interpretation.
+
+    Returns:
+        (m,) verdicts, (m, 3, 3) rotations, (m, 3) translations, (m,) least-squares misfits, and
+        (m, 6, 6) information about small motions (see `motion_kernels`).
+    """
+    size = len(interpretations)
+    count = len(points)
+    contacts = (points, measured, position_error, normal_error)
+    bounds = (points, measured, position_error, 2.0 * np.sin(0.5 * normal_error))
+    verdicts = np.empty(size, np.int8)
+    rotations = np.empty((size, 3, 3))
+    translations = np.empty((size, 3))
+    costs = np.empty(size)
+    informations = np.empty((size, 6, 6))
+    values = np.empty(4)
+    vectors = np.empty((4, 4))
+    best = np.zeros(3)
+    rotation = np.empty((3, 3))
+    translation = np.empty(3)
+    fitted = np.empty((3, 3))
+    shifted = np.empty(3)
+    system = np.empty((6, 6))
+    gradient = np.empty(6)
+    x = np.empty((count, 3))
+    u = np.empty((count, 3))
+    faces = np.empty(count, np.int64)
+    for m in range(size):
+        faces[:] = interpretations[m]
+        verdicts[m] = REJECTED
+        slack = align(faces, bounds, model, values, vectors)
+        if slack < -1e-6:
+            continue
+        slack = max(slack, 0.0)
+        rotation_at(best, vectors, rotation)
+        middle_translation(faces, points, middles, rotation, translation)
+        fit_pose(faces, contacts, model, MOST_FIT_STEPS, rotation, translation)
+        worst = _meets(faces, bounds, model, rotation, translation, x, u)
+        if EXACT < worst < NEAR_MISS and seek_feasible(
+            faces, faces, bounds, model, 60, rotation, translation
+        ):
+            worst = _meets(faces, bounds, model, rotation, translation, x, u)
+        if worst <= EXACT:
+            verdicts[m] = FEASIBLE
+        else:
+            verdicts[m] = search_poses(
+                slack,
+                values,
+                vectors,
+                faces,
+                bounds,
+                model,
+                middles,
+                most_boxes,
+                rotation,
+                translation,
+            )
+            if verdicts[m] == REJECTED:
+                continue
+            # A better pose than just any witness: the fit nearest to it, if that is one too.
+            fitted[:] = rotation
+            shifted[:] = translation
+            fit_pose(faces, contacts, model, MOST_FIT_STEPS, fitted, shifted)
+            if verdicts[m] == UNDECIDED or (
+                _meets(faces, bounds, model, fitted, shifted, x, u) <= EXACT
+            ):
+                rotation[:] = fitted
+                translation[:] = shifted
+        to_object(points, measured, rotation, translation, x, u)
+        costs[m] = assemble_fit(True, x, u, faces, contacts, model, system, gradient)
+        assemble_fit(False, x, u, faces, contacts, model, system, gradient)
+        rotations[m] = rotation
+        translations[m] = translation
+        for a in range(6):
+            for b in range(6):
+                informations[m, a, b] = system[max(a, b), min(a, b)]
+    return verdicts, rotations, translations, costs, informations

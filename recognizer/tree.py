@@ -1,0 +1,184 @@
+"""The interpretation tree: a face for each contact, pruned by pairs (memo, Section 2).
+
+Level k of the tree pairs contact k with every face of the model. A branch lives while every two of
+its pairings are possible together, which four constraints on pairs decide; each is an outer bound
+on what contacts inside their error bounds can show, so the true interpretation is never pruned.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import tree_kernels
+from .contacts import Contacts
+from .ranges import PairTables
+
+WORD = 64
+
+
+@dataclass(frozen=True, kw_only=True)
+class Constraints:
+    """Which constraints on pairs of contacts prune the tree."""
+
+    distance: bool = True
+    """Distance between the contacts (Section 2.1.1)."""
+    angle: bool = True
+    """Angle between the normals (Section 2.1.2)."""
+    component: bool = True
+    """Component of the separation along either normal (Section 2.1.3, extended direction)."""
+    tilt: bool = False
+    """Angle of the separation against either normal (Section 2.1.3, simple direction).
+
+    Off by default: `component` and `distance` together leave it little to do.
+    """
+
+    @property
+    def bits(self) -> int:
+        """The switches as the kernels read them."""
+        return (
+            tree_kernels.DISTANCE * self.distance
+            + tree_kernels.ANGLE * self.angle
+            + tree_kernels.COMPONENT * self.component
+            + tree_kernels.TILT * self.tilt
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Pruned:
+    """What a search of the tree left."""
+
+    faces: NDArray[np.int32]
+    """(m, n) interpretations: a face for each contact, contacts as they were given."""
+    nodes: NDArray[np.int64]
+    """(n,) interpretations alive at each level, in the order of the search."""
+    complete: bool
+    """False if the budget ran out: then interpretations are missing."""
+
+
+@dataclass(eq=False)
+class InterpretationTree:
+    """One model's tree over contacts in a fixed order, grown a few levels at a time."""
+
+    tables: PairTables
+    contacts: Contacts
+    constraints: Constraints
+    nodes: NDArray[np.int64] = field(init=False)
+    """(n,) interpretations seen at each level so far."""
+
+    def __post_init__(self) -> None:
+        count, faces = len(self.contacts), self.tables.face_count
+        words = -(-faces // WORD)
+        self.nodes = np.zeros(count, np.int64)
+        self._all_faces = np.zeros(words, np.uint64)
+        for face in range(faces):
+            self._all_faces[face // WORD] |= np.uint64(1) << np.uint64(face % WORD)
+        self._domains = np.tile(self._all_faces, (count, 1))
+        self._masks = np.empty((count, count, faces, words), np.uint64)
+
+    def extend(
+        self, prefixes: NDArray[np.int32], stop: int, budget: int
+    ) -> tuple[NDArray[np.int32], bool]:
+        """Extend interpretations of the first contacts to the first ``stop`` contacts.
+
+        Args:
+            prefixes: (m, k) a face for each of the first k contacts; (1, 0) is the root.
+            stop: how many contacts to reach, more than k.
+            budget: the most interpretations to return.
+
+        Returns:
+            (m', stop) interpretations, and whether they are all there are.
+        """
+        start = prefixes.shape[1]
+        for level in range(start):
+            # Later pairs matter only for faces that some surviving interpretation uses.
+            self._domains[level] = _as_bits(prefixes[:, level], len(self._all_faces))
+        tables, contacts = self.tables, self.contacts
+        tree_kernels.pair_masks(
+            contacts.positions[:stop],
+            contacts.normals[:stop],
+            contacts.position_error[:stop],
+            contacts.normal_error[:stop],
+            tables.distance_min,
+            tables.distance_max,
+            tables.angle,
+            tables.component_min,
+            tables.component_max,
+            tables.tilt_min,
+            tables.tilt_max,
+            self._domains,
+            start,
+            self.constraints.bits,
+            self._masks,
+        )
+        return tree_kernels.grow(prefixes, self._domains, self._masks, stop, budget, self.nodes)
+
+
+def root() -> NDArray[np.int32]:
+    """(1, 0) the interpretation of no contacts."""
+    return np.zeros((1, 0), np.int32)
+
+
+def far_apart_order(positions: NDArray[np.float64]) -> NDArray[np.intp]:
+    """An order of contacts that puts far-apart ones first (memo, Section 4.3).
+
+    The two farthest apart come first, then always the one whose nearest predecessor is farthest.
+
+    Args:
+        positions: (n, 3) points, metres.
+
+    Returns:
+        (n,) row indices.
+    """
+    count = len(positions)
+    if count < 2:
+        return np.arange(count)
+    apart = np.linalg.norm(positions[:, None] - positions, axis=2)
+    first, second = np.unravel_index(int(apart.argmax()), apart.shape)
+    if first == second:
+        return np.arange(count)
+    order = [int(first), int(second)]
+    gap = np.minimum(apart[first], apart[second])
+    gap[order] = -1.0
+    while len(order) < count:
+        farthest = int(gap.argmax())
+        order.append(farthest)
+        gap = np.minimum(gap, apart[farthest])
+        gap[order] = -1.0
+    return np.array(order)
+
+
+def prune(
+    tables: PairTables,
+    contacts: Contacts,
+    *,
+    constraints: Constraints | None = None,
+    sort: bool = True,
+    budget: int = 1_000_000,
+) -> Pruned:
+    """All interpretations that the constraints on pairs allow; no poses are computed.
+
+    Args:
+        tables: the model's range tables.
+        contacts: what was felt.
+        constraints: which constraints prune; all but the simple direction one by default.
+        sort: far-apart contacts first; otherwise in the given order.
+        budget: the most interpretations to return.
+    """
+    order = far_apart_order(contacts.positions) if sort else np.arange(len(contacts))
+    tree = InterpretationTree(tables, contacts[order], constraints or Constraints())
+    if not len(contacts):
+        return Pruned(root(), tree.nodes, True)
+    leaves, complete = tree.extend(root(), len(contacts), budget)
+    faces = np.empty_like(leaves)
+    faces[:, order] = leaves
+    return Pruned(faces, tree.nodes, complete)
+
+
+def _as_bits(faces: NDArray[np.int32], words: int) -> NDArray[np.uint64]:
+    bits = np.zeros(words, np.uint64)
+    present = np.unique(faces).astype(np.uint64)
+    np.bitwise_or.at(bits, present >> np.uint64(6), np.uint64(1) << (present & np.uint64(63)))
+    return bits

@@ -1,0 +1,1 @@
+"""The commands of `palpate`, one file a command: parse, call, print."""
