@@ -12,6 +12,7 @@ BIN := $(VENV)/bin
 CREATED := $(VENV)/.created
 RUNTIME := $(VENV)/.runtime-installed
 DEV := $(VENV)/.dev-installed
+COMPILED := $(VENV)/.kernels-compiled
 PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
 
 .DEFAULT_GOAL := help
@@ -34,10 +35,10 @@ help:
 	@echo "  ARGS='...'         is handed on, as in: make run ARGS='--object stapler --seed 7'"
 	@echo "  PYTHON=python3.12  chooses the Python that .venv is made with (3.11 or newer)"
 
-run: $(RUNTIME)
+run: $(RUNTIME) $(COMPILED)
 	@$(BIN)/palpate episode $(ARGS)
 
-test: $(DEV)
+test: $(DEV) $(COMPILED)
 	@$(BIN)/pytest -n auto --maxprocesses 8 -m "not slow" $(ARGS)
 
 check: format-check lint wheel types smoke
@@ -74,10 +75,10 @@ smoke: wheel
 	cd "$$away" && venv/bin/palpate --version && venv/bin/palpate episode --seed 1 --picture out.png && \
 	test -s out.png
 
-bench: $(DEV)
+bench: $(DEV) $(COMPILED)
 	@$(BIN)/palpate benchmark $(ARGS)
 
-soundness: $(DEV)
+soundness: $(DEV) $(COMPILED)
 	@$(BIN)/pytest -n auto --maxprocesses 8 -m slow $(ARGS)
 
 format: $(DEV)
@@ -102,17 +103,21 @@ $(CREATED):
 	    exit 1; }
 	@touch $@
 
-# Compiling the kernels once, here, keeps the wait out of the first episode and the first test.
 $(RUNTIME): pyproject.toml $(CREATED)
 	@echo "set-up: installing palpate and what it runs on (once; a minute or two)"
 	@$(PIP) install --editable .
-	@echo "set-up: compiling the recogniser's kernels (once)"
-	@$(BIN)/python -m palpate.recognizer.warm_up
 	@touch $@
 
 $(DEV): pyproject.toml $(CREATED)
 	@echo "set-up: installing palpate and the tools of its tests and checks (once; some minutes)"
 	@$(PIP) install --editable '.[dev]'
-	@echo "set-up: compiling the recogniser's kernels (once)"
-	@$(BIN)/python -m palpate.recognizer.warm_up
 	@touch $(RUNTIME) $@
+
+# Compiling the kernels once, here, keeps the wait out of the first episode and the first test.
+# numba looks only at a kernel's own file to see whether its compiled code is stale, not at the
+# kernels it calls: so all are compiled anew when any has changed.
+$(COMPILED): $(wildcard recognizer/*_kernels.py) $(RUNTIME)
+	@echo "set-up: compiling the recogniser's kernels (once; under a minute)"
+	@rm -f recognizer/__pycache__/*_kernels.*.nb[ci]
+	@$(BIN)/python -m palpate.recognizer.warm_up
+	@touch $@

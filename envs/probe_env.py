@@ -10,7 +10,14 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
-from ..recognizer import Belief, Contacts, PoseTolerance, Recognizer, SearchLimits
+from ..recognizer import (
+    Belief,
+    Contacts,
+    Polyhedron,
+    PoseTolerance,
+    Recognizer,
+    SearchLimits,
+)
 from .library import LibrarySource, load_library
 from .observation import Observation, ObservationLayout
 from .scene import Placement, ProbeScene
@@ -187,13 +194,12 @@ class ProbeEnv(gymnasium.Env[Observation, NDArray[np.float64]]):
             ValueError: an action of the wrong shape or that isn't finite.
             gymnasium.error.ResetNeeded: before the first reset.
         """
-        if self._scene is None:
-            raise gymnasium.error.ResetNeeded("call reset before step")
+        scene = self._placed()
         wanted = np.asarray(action, np.float64)
         if wanted.shape != (3,) or not np.isfinite(wanted).all():
             raise ValueError(f"an action is three finite numbers, not {action!r}")
         x, y, yaw = np.clip(wanted, -1.0, 1.0) * (self.half_width, self.half_width, np.pi / 3.0)
-        touch = self._sensor.touch(self._scene, x, y, yaw, self.np_random)
+        touch = self._sensor.touch(scene, x, y, yaw, self.np_random)
         self._touches.append(touch)
         if len(touch.contacts):
             self._contacts = Contacts.join([self._contacts, touch.contacts])
@@ -203,11 +209,19 @@ class ProbeEnv(gymnasium.Env[Observation, NDArray[np.float64]]):
         return self._observe(), -1.0, ended, truncated, self._info()
 
     @property
+    def true_object(self) -> Polyhedron:
+        """What the object truly is; for scoring and pictures alone."""
+        return self._placed().model
+
+    @property
     def T_world_object(self) -> RigidTransform:
-        """Where the object truly is; for scoring alone."""
+        """Where the object truly is; for scoring and pictures alone."""
+        return self._placed().T_world_object
+
+    def _placed(self) -> ProbeScene:
         if self._scene is None:
             raise gymnasium.error.ResetNeeded("call reset first")
-        return self._scene.T_world_object
+        return self._scene
 
     def _observe(self) -> Observation:
         # Past max_probes an episode may be stepped on; the observation keeps its last rows.
@@ -216,6 +230,5 @@ class ProbeEnv(gymnasium.Env[Observation, NDArray[np.float64]]):
         return self._layout.pack(contacts, touches, self._belief, self._index)
 
     def _info(self) -> dict[str, Any]:
-        assert self._scene is not None
-        pose = self._scene.T_world_object.as_matrix()
-        return {"truth": {"object": self._scene.model.name, "pose": pose}}
+        pose = self.T_world_object.as_matrix()
+        return {"truth": {"object": self.true_object.name, "pose": pose}}

@@ -21,6 +21,7 @@ the truth for certain.
 """
 
 from .belief import Belief, Search
+from .comparison import PoseDifference, pose_difference
 from .contacts import Contacts
 from .hypotheses import Hypothesis, PoseTolerance
 from .library import load_folder
@@ -36,9 +37,11 @@ __all__ = [
     "Hypothesis",
     "PairTables",
     "Polyhedron",
+    "PoseDifference",
     "PoseTolerance",
     "Recognizer",
     "Search",
     "SearchLimits",
     "load_folder",
+    "pose_difference",
 ]

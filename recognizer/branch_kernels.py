@@ -24,7 +24,6 @@ from .motion_kernels import move, to_object
 REJECTED, FEASIBLE, UNDECIDED = 0, 1, 2
 """No pose meets the bounds; the pose found meets them; neither could be shown in the budget."""
 
-MOST_BOXES = 256
 STACK = 512
 
 
@@ -43,8 +42,9 @@ def align(faces, contacts, model, values, vectors):
         vectors: (4, 4) unit quaternions (w, x, y, z) in columns, best last, written in place.
 
     Returns:
-        How far the best rotation's misfit is below what a feasible one may have; negative if no
-        rotation meets the bounds on normals.
+        How far the best rotation's misfit is below what a feasible one may have, negative if no
+        rotation meets the bounds on normals; and the spread (radians) of the rotation about its
+        vaguest axis that the normals leave.
     """
     _, measured, _, chords = contacts
     normals = model[0]
@@ -73,8 +73,10 @@ def align(faces, contacts, model, values, vectors):
     found, axes = np.linalg.eigh(k4)
     values[:] = found
     vectors[:] = axes
+    # Turning by an angle s about the vaguest axis costs (values[3] - values[2]) sin^2(s / 2).
+    spread = 1.0 / np.sqrt(max(0.5 * (found[3] - found[2]), 1e-12))
     # Sum of weight |R m - n|^2 is 2 total - 2 q^T K q.
-    return budget - (2.0 * total - 2.0 * found[3])
+    return budget - (2.0 * total - 2.0 * found[3]), spread
 
 
 @njit(cache=True)
@@ -139,7 +141,7 @@ def search_poses(
     """Search all poses of an interpretation; a witness goes into rotation and translation.
 
     Args:
-        slack: what `align` returned, not negative.
+        slack: what `align` returned first, not negative.
         values: (4,) and vectors (4, 4), from `align`.
         faces: (n,) the face of each contact.
         contacts: positions, normals, position bounds, bounds on chords; world frame.
@@ -150,7 +152,7 @@ def search_poses(
         translation: (3,) written in place.
 
     Returns:
-        REJECTED, FEASIBLE or UNDECIDED.
+        REJECTED, FEASIBLE or UNDECIDED, and how many boxes were looked at.
     """
     points, measured, reaches, chords = contacts
     normals, first = model[0], model[2]
@@ -175,9 +177,9 @@ def search_poses(
     targets[0] = faces
     height = 1
     open_boxes = False
-    for _ in range(most):
+    for looked in range(most):
         if height == 0:
-            return UNDECIDED if open_boxes else REJECTED
+            return (UNDECIDED if open_boxes else REJECTED), looked
         height -= 1
         v[:] = centres[height]
         half[:] = halves[height]
@@ -220,14 +222,14 @@ def search_poses(
                 if worst <= EXACT:
                     rotation[:] = moved_turn
                     translation[:] = moved_shift
-                    return FEASIBLE
+                    return FEASIBLE, looked
                 split_faces = True
         if split_faces:
             # Every bound is met on the hulls, but this contact is beside its concave face.
             f = faces[where]
             for p in range(first[f], first[f + 1]):
                 if height == STACK:
-                    return UNDECIDED
+                    return UNDECIDED, most
                 centres[height] = v
                 halves[height] = half
                 targets[height] = chosen
@@ -245,11 +247,11 @@ def search_poses(
                 longest = k
         for side in range(2):
             if height == STACK:
-                return UNDECIDED
+                return UNDECIDED, most
             centres[height] = v
             halves[height] = half
             targets[height] = chosen
             halves[height, longest] *= 0.5
             centres[height, longest] += (2 * side - 1) * halves[height, longest]
             height += 1
-    return UNDECIDED
+    return UNDECIDED, most

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
+from scipy.spatial.distance import pdist, squareform
 
 COPLANAR_ANGLE = 1e-4
 """Adjacent triangles that turn by less (radians) are one face, however large they are."""
@@ -40,6 +41,32 @@ def edge_neighbours(triangles: Ints) -> Ints:
             f" and {crowded} to more than two; each must belong to two"
         )
     return np.column_stack([owner[first], owner[first + 1], ends[first]])
+
+
+def turned_against(triangles: Ints) -> NDArray[np.bool_]:
+    """Which triangles to reverse so that neighbours run along their common edge opposite ways.
+
+    Args:
+        triangles: (t, 3) vertex indices of a closed mesh.
+
+    Raises:
+        ValueError: the mesh isn't closed, or has one side only.
+    """
+    first, second, start, end = edge_neighbours(triangles).T
+    along = [
+        ((sides == start[:, None]) & (np.roll(sides, -1, axis=1) == end[:, None])).any(axis=1)
+        for sides in (triangles[first], triangles[second])
+    ]
+    clash = along[0] == along[1]
+    # Two nodes a triangle, as it is and reversed; ways of winding that go together are linked.
+    count = len(triangles)
+    links = np.concatenate([first, first + count])
+    partners = np.concatenate([second + count * clash, second + count * ~clash])
+    graph = coo_matrix((np.ones(len(links)), (links, partners)), (2 * count, 2 * count))
+    kept, reversed_ = connected_components(graph, directed=False)[1].reshape(2, count)
+    if (kept == reversed_).any():
+        raise ValueError("the mesh has one side only; a solid's surface has an inside")
+    return kept > reversed_
 
 
 def group_coplanar(vertices: Floats, triangles: Ints) -> Ints:
@@ -117,8 +144,12 @@ def convex_hull_in_plane(corners: Floats, normal: Floats) -> Floats:
     Returns:
         (h, 3) corners of the hull.
     """
-    across = np.eye(3)[np.argmin(np.abs(normal))]
-    u = np.cross(normal, across)
+    # Sorted along the line between the two farthest apart, the first and the last are corners
+    # for certain: no other comes near them in that order, whatever rounding does to it.
+    apart = squareform(pdist(corners))
+    first, last = np.unravel_index(int(apart.argmax()), apart.shape)
+    u = corners[last] - corners[first]
+    u -= (u @ normal) * normal
     u /= np.linalg.norm(u)
     flat = np.column_stack([corners @ u, corners @ np.cross(normal, u)])
     order = np.lexsort((flat[:, 1], flat[:, 0]))

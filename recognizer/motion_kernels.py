@@ -56,7 +56,8 @@ def solve(system, gradient, damping, factor, step):
     Args:
         system: (k, k) symmetric, of which the lower triangle is read.
         gradient: (k,) right side.
-        damping: added to the diagonal.
+        damping: added to the diagonal of the six lengths, inverse square metres; a level beyond
+            them has no unit, and damping it would make the steps of small objects fall short.
         factor: (k, k) work space.
         step: (k,) written in place.
     """
@@ -64,7 +65,7 @@ def solve(system, gradient, damping, factor, step):
     for a in range(size):
         for b in range(a + 1):
             value = system[a, b]
-            if a == b:
+            if a == b and a < 6:
                 value += damping
             for k in range(b):
                 value -= factor[a, k] * factor[b, k]

@@ -13,7 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.distance import pdist
 
-from .faces import convex_hull_in_plane, convex_pieces, edge_neighbours, group_coplanar, plane_of
+from .faces import (
+    convex_hull_in_plane,
+    convex_pieces,
+    edge_neighbours,
+    group_coplanar,
+    plane_of,
+    turned_against,
+)
 from .symmetry import FaceSummary, rotational_symmetries
 
 if TYPE_CHECKING:
@@ -154,10 +161,6 @@ class Polyhedron:
     ) -> Polyhedron:
         if len(triangles) < 4:
             raise ValueError(f"{len(triangles)} triangles can't enclose a volume")
-        bad = np.flatnonzero(~np.isfinite(vertices).all(axis=1))
-        if bad.size:
-            raise ValueError(f"vertex {bad[0]} is {vertices[bad[0]].tolist()}; it must be finite")
-        edge_neighbours(triangles)
         triangles = _outward(vertices, triangles, name)
         owner = group_coplanar(vertices, triangles)
         count = int(owner.max()) + 1
@@ -222,6 +225,10 @@ def _read(
             raise ValueError(f"{path}: holds no triangle mesh")
     else:
         raise ValueError(f"a mesh must be a trimesh.Trimesh or a path, not {type(mesh).__name__}")
+    bad = np.flatnonzero(~np.isfinite(loaded.vertices).all(axis=1))
+    if bad.size:
+        corner = loaded.vertices[bad[0]].tolist()
+        raise ValueError(f"{label}: vertex {bad[0]} is {corner}; it must be finite")
     loaded.merge_vertices(merge_tex=True, merge_norm=True)
     triangles = np.asarray(loaded.faces, dtype=np.int64).reshape(-1, 3)
     distinct = (np.diff(np.sort(triangles, axis=1), axis=1) > 0).all(axis=1)
@@ -235,14 +242,9 @@ def _outward(
     vertices: NDArray[np.float64], triangles: NDArray[np.int64], name: str
 ) -> NDArray[np.int64]:
     """The triangles, all counter-clockwise seen from outside; says so where it had to mend."""
-    pairs = np.sort(np.concatenate([triangles[:, [0, 1]], triangles[:, 1:], triangles[:, [2, 0]]]))
-    directed = np.concatenate([triangles[:, [0, 1]], triangles[:, 1:], triangles[:, [2, 0]]])
-    if len(np.unique(directed, axis=0)) != len(pairs):
-        import trimesh
-
-        mended = trimesh.Trimesh(vertices, triangles, process=False)
-        trimesh.repair.fix_winding(mended)
-        triangles = np.asarray(mended.faces, dtype=np.int64)
+    against = turned_against(triangles)
+    if against.any():
+        triangles = np.where(against[:, None], triangles[:, ::-1], triangles)
         warnings.warn(f"{name}: its winding was inconsistent; mended", UserWarning, stacklevel=5)
     corners = vertices[triangles]
     size = float(np.ptp(vertices, axis=0).max())

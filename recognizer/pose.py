@@ -61,7 +61,16 @@ class Poses:
 class ModelTest:
     """The model test for one model; holds the model as the kernels read it."""
 
-    def __init__(self, model: Polyhedron) -> None:
+    def __init__(self, model: Polyhedron, *, boxes: int = 256, pool: int = 20_000) -> None:
+        """Prepare a model.
+
+        Args:
+            model: the object.
+            boxes: boxes of rotations to look at before an interpretation is left undecided.
+            pool: the same for all interpretations of one call together; a thousand take about
+                a tenth of a second.
+        """
+        self._boxes, self._pool = boxes, pool
         hulls, pieces = model.hulls, model.pieces
         self.radius = model.diameter / 2.0
         self._model = (
@@ -83,16 +92,8 @@ class ModelTest:
             interpretations: (m, n) a face for each contact.
             contacts: the n contacts.
         """
-        verdicts, rotations, translations, costs, informations = pose_kernels.test_interpretations(
-            interpretations,
-            contacts.positions,
-            contacts.normals,
-            contacts.position_error,
-            contacts.normal_error,
-            self._model,
-            self._middles,
-            branch_kernels.MOST_BOXES,
-        )
+        verdicts, *rest = self._verdicts(interpretations, contacts, pass_vague=False)
+        rotations, translations, costs, informations = rest
         poses = Poses(
             interpretations,
             rotations,
@@ -102,3 +103,31 @@ class ModelTest:
             verdicts == branch_kernels.FEASIBLE,
         )
         return poses.take(verdicts != branch_kernels.REJECTED)
+
+    def prune(
+        self, interpretations: NDArray[np.int32], contacts: Contacts
+    ) -> NDArray[np.int32]:
+        """Drop partial interpretations that no pose satisfies, where that is quickly shown.
+
+        Args:
+            interpretations: (m, k) a face for each of the first k contacts.
+            contacts: those k contacts.
+        """
+        verdicts = self._verdicts(interpretations, contacts, pass_vague=True)[0]
+        return interpretations[verdicts != branch_kernels.REJECTED]
+
+    def _verdicts(
+        self, interpretations: NDArray[np.int32], contacts: Contacts, *, pass_vague: bool
+    ) -> tuple[NDArray[np.int8], Floats, Floats, Floats, Floats]:
+        return pose_kernels.test_interpretations(
+            interpretations,
+            contacts.positions,
+            contacts.normals,
+            contacts.position_error,
+            contacts.normal_error,
+            self._model,
+            self._middles,
+            self._boxes,
+            self._pool,
+            pass_vague,
+        )

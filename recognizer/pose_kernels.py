@@ -19,8 +19,8 @@ from .fit_kernels import assemble_fit, fit_pose
 from .motion_kernels import to_object
 
 MOST_FIT_STEPS = 20
-NEAR_MISS = 1e9
-"""Excess of a fitted pose up to which nudging it inside the bounds is tried before all else."""
+VAGUE = 0.6
+"""Spread (radians) of a rotation from which the normals don't fix it."""
 
 
 @njit(cache=True)
@@ -33,7 +33,16 @@ def _meets(faces, contacts, model, rotation, translation, x, u):
 
 @njit(cache=True)
 def test_interpretations(
-    interpretations, points, measured, position_error, normal_error, model, middles, most_boxes
+    interpretations,
+    points,
+    measured,
+    position_error,
+    normal_error,
+    model,
+    middles,
+    most_boxes,
+    pool,
+    pass_vague,
 ):
     """Fit a pose to each interpretation and test whether its bounds can be met.
 
@@ -47,7 +56,10 @@ def test_interpretations(
             face; (p + 1,) the first corner of each polygon, of which the first f are the faces'
             hulls and the rest their pieces; corners (c, 3); centroid (3,); radius. Object frame.
         middles: (f, 3) a point inside each face's hull.
-        most_boxes: the most boxes of rotations to look at an interpretation.
+        most_boxes: the most boxes of rotations to look at, an interpretation.
+        pool: the most boxes in all; once it is empty, what no fit settles stays undecided.
+        pass_vague: leave interpretations whose normals don't fix the rotation undecided at once.
+            They are what the search is slowest on, and more contacts soon settle them.
 
     Returns:
         (m,) verdicts, (m, 3, 3) rotations, (m, 3) translations, (m,) least-squares misfits, and
@@ -58,10 +70,10 @@ def test_interpretations(
     contacts = (points, measured, position_error, normal_error)
     bounds = (points, measured, position_error, 2.0 * np.sin(0.5 * normal_error))
     verdicts = np.empty(size, np.int8)
-    rotations = np.empty((size, 3, 3))
-    translations = np.empty((size, 3))
-    costs = np.empty(size)
-    informations = np.empty((size, 6, 6))
+    rotations = np.zeros((size, 3, 3))
+    translations = np.zeros((size, 3))
+    costs = np.zeros(size)
+    informations = np.zeros((size, 6, 6))
     values = np.empty(4)
     vectors = np.empty((4, 4))
     best = np.zeros(3)
@@ -77,22 +89,25 @@ def test_interpretations(
     for m in range(size):
         faces[:] = interpretations[m]
         verdicts[m] = REJECTED
-        slack = align(faces, bounds, model, values, vectors)
+        slack, spread = align(faces, bounds, model, values, vectors)
         if slack < -1e-6:
+            continue
+        if pass_vague and spread > VAGUE:
+            verdicts[m] = UNDECIDED
             continue
         slack = max(slack, 0.0)
         rotation_at(best, vectors, rotation)
         middle_translation(faces, points, middles, rotation, translation)
         fit_pose(faces, contacts, model, MOST_FIT_STEPS, rotation, translation)
         worst = _meets(faces, bounds, model, rotation, translation, x, u)
-        if EXACT < worst < NEAR_MISS and seek_feasible(
+        if worst > EXACT and seek_feasible(
             faces, faces, bounds, model, 60, rotation, translation
         ):
             worst = _meets(faces, bounds, model, rotation, translation, x, u)
         if worst <= EXACT:
             verdicts[m] = FEASIBLE
         else:
-            verdicts[m] = search_poses(
+            verdicts[m], looked = search_poses(
                 slack,
                 values,
                 vectors,
@@ -100,10 +115,11 @@ def test_interpretations(
                 bounds,
                 model,
                 middles,
-                most_boxes,
+                min(most_boxes, pool),
                 rotation,
                 translation,
             )
+            pool -= looked
             if verdicts[m] == REJECTED:
                 continue
             # A better pose than just any witness: the fit nearest to it, if that is one too.

@@ -13,9 +13,9 @@ from .belief import Belief, Search
 from .contacts import Contacts
 from .hypotheses import Hypothesis, PoseTolerance, cluster
 from .polyhedron import Polyhedron
-from .pose import ModelTest, Poses
+from .pose import ModelTest
 from .ranges import PairTables
-from .tree import Constraints, InterpretationTree, far_apart_order, root
+from .tree import Constraints, InterpretationTree, root, spread_order
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,15 +25,17 @@ class SearchLimits:
     budget: int = 100_000
     """The most interpretations of one model held at a time; more, and the belief says that it is
     not complete."""
-    stage: int = 4
-    """Levels grown between two model tests, after the first ``first_stage``."""
-    first_stage: int = 6
+    first_stage: int = 4
     """Levels grown before the first model test."""
+    stage: int = 4
+    """Levels grown between two model tests after it, while interpretations are few."""
     crowd: int = 64
-    """Interpretations below which an inner model test isn't worth its time."""
+    """Interpretations from which the model test is worth its time within the tree."""
+    flood: int = 2000
+    """Interpretations at which a stage is broken off and grown a level at a time instead."""
 
     def __post_init__(self) -> None:
-        for name in ("budget", "stage", "first_stage", "crowd"):
+        for name in ("budget", "first_stage", "stage", "crowd", "flood"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} is {getattr(self, name)}; it must be at least 1")
 
@@ -110,7 +112,7 @@ class Recognizer:
         """
         if not len(contacts):
             raise ValueError("no contacts: before the first touch every object and pose fits")
-        order = far_apart_order(contacts.positions)
+        order = spread_order(contacts)
         back = np.argsort(order)
         found: list[Hypothesis] = []
         logs, searches = [], []
@@ -133,25 +135,32 @@ class Recognizer:
         limits, count = self.limits, len(contacts)
         tree = InterpretationTree(entry.tables, contacts, self.constraints)
         faces, complete = root(), True
-        poses: Poses | None = None
         tree_seconds = pose_seconds = 0.0
-        stop = min(count, limits.first_stage)
+        step = limits.first_stage
         while True:
+            start = faces.shape[1]
             started = perf_counter()
-            faces, whole = tree.extend(faces, stop, limits.budget)
-            complete &= whole
+            if len(faces):
+                stop = min(count, start + step)
+                cap = limits.flood if stop > start + 1 else limits.budget
+                grown, whole = tree.extend(faces, stop, min(cap, limits.budget))
+                if not whole and stop > start + 1:
+                    stop = start + 1
+                    grown, whole = tree.extend(faces, stop, limits.budget)
+                faces = grown
+                complete &= whole
             tree_seconds += perf_counter() - started
-            if stop == count or len(faces) == 0:
+            if not len(faces) or faces.shape[1] == count:
                 break
             if len(faces) > limits.crowd:
                 # Rejecting part of an interpretation rejects every way to complete it.
                 started = perf_counter()
-                faces = entry.test.run(faces, contacts[:stop]).faces
+                faces = entry.test.prune(faces, contacts[: faces.shape[1]])
                 pose_seconds += perf_counter() - started
-            stop = min(count, stop + limits.stage)
+            step = limits.stage if len(faces) <= limits.crowd else 1
         pruned = len(faces)
         started = perf_counter()
-        if stop < count:
+        if not pruned:
             faces = np.zeros((0, count), np.int32)
         poses = entry.test.run(faces, contacts)
         pose_seconds += perf_counter() - started

@@ -54,7 +54,9 @@ def rotational_symmetries(faces: FaceSummary, corners: Floats, diameter: float) 
     )
     cosines = faces.normals @ faces.normals.T
     first = int(alike.sum(axis=1).argmin())
-    slanted = np.abs(cosines[first]) < 0.99
+    # The more the two lean apart, the better they fix a frame; in a flat solid no two do by much.
+    sines = np.linalg.norm(np.cross(faces.normals[first], faces.normals), axis=1)
+    slanted = sines > 0.5 * sines.max()
     second = int(np.where(slanted, alike.sum(axis=1), len(alike) + 1).argmin())
     frame = _frame(faces.normals[first], faces.normals[second])
     tree = KDTree(corners)

@@ -2,12 +2,25 @@
 
 from __future__ import annotations
 
+import json as json_format
+from collections import Counter
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+if TYPE_CHECKING:
+    from rich.console import Console
+    from scipy.spatial.transform import RigidTransform
+
+    from ..envs.probe_env import ProbeEnv
+    from ..envs.sensor import Touch
+    from ..recognizer import Belief, Hypothesis
+
 __all__ = ["episode"]
+
+MOST_GHOSTS = 3
+"""More rivals than this in one picture hide each other."""
 
 
 def episode(
@@ -24,7 +37,7 @@ def episode(
         Path | None,
         typer.Option(
             metavar="FOLDER",
-            help="A folder of closed meshes (OBJ or STL, metres) to tell apart. "
+            help="A folder of closed meshes (OBJ, OFF, PLY or STL, metres) to tell apart. "
             "[dim]default: the library that comes with palpate[/]",
             show_default=False,
         ),
@@ -43,18 +56,13 @@ def episode(
     position_error: Annotated[
         float,
         typer.Option(
-            metavar="M",
-            min=0.0,
-            help="A contact is felt within this distance of the truth, metres.",
+            metavar="M", help="A contact is felt within this distance of the truth, metres."
         ),
     ] = 0.000254,
     normal_error_deg: Annotated[
         float,
         typer.Option(
-            metavar="A",
-            min=0.0,
-            max=90.0,
-            help="A normal is felt within this angle of the truth, degrees.",
+            metavar="A", help="A normal is felt within this angle of the truth, degrees."
         ),
     ] = 18.0,
     max_probes: Annotated[
@@ -68,4 +76,182 @@ def episode(
 
     Prints what could still be true after each probe, and draws the end as a picture.
     """
-    raise NotImplementedError
+    import numpy as np
+    from rich.console import Console
+
+    from ..envs.probe_env import ProbeEnv
+    from ..policies import make_policy
+
+    chooser = make_policy(policy)
+    env = ProbeEnv(
+        library,
+        object_name=object_name,
+        position_error=position_error,
+        normal_error=float(np.radians(normal_error_deg)),
+        max_probes=max_probes,
+    )
+    # The policy's stream is the seed's child: it never meets the environment's own.
+    rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(1)[0])
+    console = Console(highlight=False, quiet=json, soft_wrap=True)
+    console.print(
+        f"An unknown object, one of {len(env.library)}, lies across a plane"
+        f" (seed {seed}, positions ±{1e3 * position_error:.3g} mm,"
+        f" normals ±{normal_error_deg:.3g}°).\n"
+    )
+    observation, _ = env.reset(seed=seed)
+    ruled_out: list[tuple[Hypothesis, str]] = []
+    ended = False
+    while not ended:
+        before = env.belief
+        action = chooser.act(observation, rng)
+        observation, _, terminated, truncated, _ = env.step(action)
+        ended = terminated or truncated
+        console.print(_told(len(env.touches), env.touches[-1], env.belief))
+        if before and env.belief and before is not env.belief:
+            ruled_out = _ruled_out(env, before, env.belief, len(env.touches)) + ruled_out
+    if json:
+        print(json_format.dumps(_document(env, seed), indent=2))
+    else:
+        console.print(_verdict(env))
+    if not no_picture:
+        _draw(env, ruled_out, picture, console)
+
+
+def _told(number: int, touch: Touch, belief: Belief | None) -> str:
+    """One line on what a probe met and what is left."""
+    from ..envs.scene import NOTHING, OBJECT, PLANE
+
+    names = {OBJECT: "object", PLANE: "plane", NOTHING: "nothing"}
+    met = " ".join(f"{names[int(outcome)]:<7}" for outcome in touch.outcomes)
+    if belief is None:
+        return f"probe {number:>2}  {met}  not touched yet: everything is possible"
+    per_object = Counter(hypothesis.object_name for hypothesis in belief.hypotheses)
+    rivals = ", ".join(f"{name} {count}" for name, count in per_object.most_common())
+    left = len(belief.hypotheses)
+    return (
+        f"probe {number:>2}  {met}"
+        f"  {_count(belief.interpretations, 'interpretation'):>20}"
+        f"  {_count(left, 'hypothesis', 'hypotheses'):>14}"
+        + (f"  ({rivals})" if rivals else "")
+        + ("" if belief.complete else "  search cut short")
+    )
+
+
+def _count(number: int, one: str, many: str = "") -> str:
+    return f"{number} {one if number == 1 else many or one + 's'}"
+
+
+def _ruled_out(
+    env: ProbeEnv, before: Belief, after: Belief, probe: int
+) -> list[tuple[Hypothesis, str]]:
+    """Hypotheses of one belief that no hypothesis of the next resembles, heaviest first."""
+    from ..recognizer import PoseTolerance, pose_difference
+
+    models = {model.name: model for model in env.library}
+    tolerance = PoseTolerance()
+    gone = []
+    for old in before.hypotheses:
+        if not old.determined:
+            continue
+        model = models[old.object_name]
+        near = tolerance.distance(model.diameter, float(env.contacts.position_error.max()))
+        differences = [
+            pose_difference(model, old.pose, new.pose)
+            for new in after.hypotheses
+            if new.object_name == old.object_name
+        ]
+        if not any(
+            d.rotation < 2 * tolerance.rotation and d.translation < 2 * near for d in differences
+        ):
+            gone.append((old, f"{old.object_name}, ruled out by probe {probe}"))
+    return gone
+
+
+def _verdict(env: ProbeEnv) -> str:
+    """What was found, and how far it is from the truth."""
+    import numpy as np
+
+    from ..recognizer import pose_difference
+
+    belief, truth = env.belief, env.T_world_object
+    lines = [""]
+    if belief is None:
+        return f"\nNo probe touched the object ({env.true_object.name})."
+    if belief.empty:
+        return "\nNo object of the library fits the contacts."
+    best = belief.hypotheses[0]
+    if belief.unique:
+        lines.append(f"It is [bold]{best.object_name}[/].")
+    else:
+        lines.append(
+            f"Not unique after {_count(len(env.touches), 'probe')}:"
+            f" {_count(len(belief.hypotheses), 'hypothesis', 'hypotheses')} left;"
+            f" the heaviest is [bold]{best.object_name}[/] (weight {best.weight:.2f})."
+        )
+    lines.append(f"  pose   {_pose(best.pose)}")
+    lines.append(f"  truth  {_pose(truth)}  {env.true_object.name}")
+    if best.object_name == env.true_object.name:
+        error = pose_difference(env.true_object, best.pose, truth)
+        lines.append(
+            f"  error  {1e3 * error.translation:.2f} mm, {np.degrees(error.rotation):.2f}°"
+            f" after {_count(len(env.touches), 'probe')} and"
+            f" {_count(len(env.contacts), 'contact')}"
+        )
+    return "\n".join(lines)
+
+
+def _pose(pose: RigidTransform) -> str:
+    import numpy as np
+
+    x, y, z = 1e3 * pose.translation
+    turn = np.degrees(pose.rotation.as_rotvec())
+    return (
+        f"({x:7.2f}, {y:7.2f}, {z:7.2f}) mm,"
+        f" rotation vector ({turn[0]:7.2f}, {turn[1]:7.2f}, {turn[2]:7.2f})°"
+    )
+
+
+def _document(env: ProbeEnv, seed: int) -> dict[str, object]:
+    """The episode as the --json document."""
+    belief = env.belief
+    return {
+        "truth": {
+            "object": env.true_object.name,
+            "pose": env.T_world_object.as_matrix().tolist(),
+        },
+        "hypotheses": [
+            {
+                "object": hypothesis.object_name,
+                "pose": hypothesis.pose.as_matrix().tolist(),
+                "weight": hypothesis.weight,
+                "determined": hypothesis.determined,
+            }
+            for hypothesis in (belief.hypotheses if belief else ())
+        ],
+        "unique": belief.unique if belief else False,
+        "complete": belief.complete if belief else True,
+        "probes": len(env.touches),
+        "contacts": len(env.contacts),
+        "seed": seed,
+    }
+
+
+def _draw(
+    env: ProbeEnv, ruled_out: list[tuple[Hypothesis, str]], path: Path, console: Console
+) -> None:
+    from ..envs.episode_picture import episode_picture
+    from ..envs.picture import draw, renderer_note
+
+    belief = env.belief
+    alive = belief.hypotheses[1:] if belief and not belief.unique else ()
+    rivals = [(rival, f"{rival.object_name}, still possible") for rival in alive]
+    summary = "recognised" if belief and belief.unique else "not unique yet"
+    scene = episode_picture(
+        env,
+        (rivals + ruled_out)[:MOST_GHOSTS],
+        title=f"{env.true_object.name}: {summary}",
+        subtitle=f"{_count(len(env.touches), 'probe')},"
+        f" {_count(len(env.contacts), 'contact')} on the object",
+    )
+    note = renderer_note(draw(scene, path))
+    console.print(f"\npicture: {path}" + (f" ({note})" if note else ""))

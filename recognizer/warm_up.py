@@ -1,0 +1,30 @@
+"""Compile every kernel once, so that the first real call doesn't wait: `python -m palpate.recognizer.warm_up`.
+
+numba keeps the compiled code beside the source, or in the user's cache where that is read-only.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial.transform import RigidTransform
+
+from .contacts import Contacts
+from .polyhedron import Polyhedron
+from .rays import cast_rays
+from .recognize import Recognizer
+
+
+def warm_up() -> None:
+    """Run the whole recogniser once on a box."""
+    import trimesh
+
+    box = Polyhedron.from_mesh(trimesh.creation.box((1.0, 2.0, 3.0)), name="box")
+    hits = cast_rays(box, RigidTransform.identity(), 5.0 * np.eye(3), -np.eye(3))
+    contacts = Contacts(
+        hits.points_world, hits.normals_world, position_error=0.01, normal_error=0.1
+    )
+    Recognizer([box]).recognize(contacts)
+
+
+if __name__ == "__main__":
+    warm_up()
