@@ -26,7 +26,7 @@ help:
 	@echo "  make run        play one probing episode (sets up .venv the first time)"
 	@echo "  make test       run the tests"
 	@echo "  make check      format, lint, types, and the wheel tried outside the repository"
-	@echo "  make bench      run the benchmark of the strategies"
+	@echo "  make bench      measure the recogniser's speed and accuracy"
 	@echo "  make soundness  run the long randomised campaigns: is the true pose ever lost?"
 	@echo "  make format     format the code and repair what lint can repair"
 	@echo "  make assets     rebuild the object library"
@@ -76,7 +76,7 @@ smoke: wheel
 	test -s out.png
 
 bench: $(DEV) $(COMPILED)
-	@$(BIN)/palpate benchmark $(ARGS)
+	@$(BIN)/python -m palpate.scripts.bench
 
 soundness: $(DEV) $(COMPILED)
 	@$(BIN)/pytest -n auto --maxprocesses 8 -m slow $(ARGS)

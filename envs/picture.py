@@ -108,10 +108,7 @@ def draw(scene: PictureScene, path: str | Path, size: tuple[int, int] = (1280, 9
         ValueError: ``path`` does not end in ``.png``, or its folder does not exist.
     """
     path = Path(path)
-    if path.suffix.lower() != ".png":
-        raise ValueError(f"a picture is a PNG: {str(path)!r} should end in .png")
-    if not path.parent.is_dir():
-        raise ValueError(f"the picture {str(path)!r} cannot be written: its folder does not exist")
+    check_path(path)
     from .picture_caption import add_caption
 
     image, renderer = _draw_with_gl(scene, size), "MuJoCo"
@@ -121,6 +118,14 @@ def draw(scene: PictureScene, path: str | Path, size: tuple[int, int] = (1280, 9
         image, renderer = draw_plot(scene, size), "matplotlib"
     _save_whole(add_caption(image, scene), path)
     return renderer
+
+
+def check_path(path: Path) -> None:
+    """Raise ValueError if no picture can be written to ``path``."""
+    if path.suffix.lower() != ".png":
+        raise ValueError(f"a picture is a PNG: {str(path)!r} should end in .png")
+    if not path.parent.is_dir():
+        raise ValueError(f"the picture {str(path)!r} cannot be written: its folder does not exist")
 
 
 def renderer_note(renderer: str) -> str:

@@ -28,7 +28,7 @@ REACH = 2.0
 """Rays start this many diameters of the largest object before the point where they meet."""
 
 
-class ProbeEnv(gymnasium.Env[Observation, NDArray[np.float64]]):
+class ProbeEnv(gymnasium.Env[Observation, NDArray[np.floating]]):
     """An unknown object of a known library is touched until one hypothesis is left.
 
     ## Description
@@ -39,7 +39,7 @@ class ProbeEnv(gymnasium.Env[Observation, NDArray[np.float64]]):
     hypotheses (object and pose) the contacts so far allow.
 
     ## Action Space
-    `Box(-1, 1, (3,))`, float64:
+    `Box(-1, 1, (3,))`, float32:
 
     | number | meaning | -1 | 1 |
     |---|---|---|---|
@@ -62,7 +62,7 @@ class ProbeEnv(gymnasium.Env[Observation, NDArray[np.float64]]):
     | ray_count | (1,) | rays sent so far |
     | ray_starts, ray_ends | (R, 3) | segments swept, metres |
     | ray_outcomes | (R,) | 1 object, 2 plane, 3 nothing; 0 not sent |
-    | hypothesis_count | (1,) | hypotheses left; 0 also before the first contact |
+    | hypothesis_count | (1,) | hypotheses left; 0 before the first contact too |
     | hypothesis_objects | (H,) | index into the library, heaviest first; -1 none |
     | hypothesis_positions | (H, 3) | origin of the model in the world, metres |
     | hypothesis_quaternions | (H, 4) | rotation model to world (x, y, z, w) |
@@ -87,7 +87,7 @@ class ProbeEnv(gymnasium.Env[Observation, NDArray[np.float64]]):
     ## Arguments
     | name | default | meaning |
     |---|---|---|
-    | library | None | names of stand-ins, ready models, or a folder of meshes; None: all stand-ins |
+    | library | None | names of stand-ins, models, or a folder of meshes; None: all stand-ins |
     | object_name | None | always this object; None: drawn at reset |
     | position_error | 0.000254 | bound on positions, metres (0.01 in) |
     | normal_error | pi / 10 | bound on normals, radians |
@@ -133,7 +133,7 @@ class ProbeEnv(gymnasium.Env[Observation, NDArray[np.float64]]):
             known = ", ".join(self._index)
             raise ValueError(f"no object is called {object_name!r}; the library has: {known}")
         self._object_name = object_name
-        self._recognizer = Recognizer(self.library, tolerance=tolerance, limits=limits)
+        self.recognizer = Recognizer(self.library, tolerance=tolerance, limits=limits)
         largest = max(model.diameter for model in self.library)
         self.half_width = largest / 2.0
         self._placement = Placement(offset=0.2 * self.half_width)
@@ -147,7 +147,7 @@ class ProbeEnv(gymnasium.Env[Observation, NDArray[np.float64]]):
             extent=2.0 * REACH * largest + position_error,
         )
         self.observation_space = self._layout.space()
-        self.action_space = spaces.Box(-1.0, 1.0, (3,), np.float64)
+        self.action_space = spaces.Box(-1.0, 1.0, (3,), np.float32)
         self._scene: ProbeScene | None = None
         self._contacts = Contacts.none()
         self._touches: list[Touch] = []
@@ -186,7 +186,7 @@ class ProbeEnv(gymnasium.Env[Observation, NDArray[np.float64]]):
         return self._observe(), self._info()
 
     def step(
-        self, action: NDArray[np.float64]
+        self, action: NDArray[np.floating]
     ) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """Send one triad; actions beyond the box are clipped to it.
 
@@ -203,7 +203,7 @@ class ProbeEnv(gymnasium.Env[Observation, NDArray[np.float64]]):
         self._touches.append(touch)
         if len(touch.contacts):
             self._contacts = Contacts.join([self._contacts, touch.contacts])
-            self._belief = self._recognizer.recognize(self._contacts)
+            self._belief = self.recognizer.recognize(self._contacts)
         ended = self._belief is not None and (self._belief.unique or self._belief.empty)
         truncated = len(self._touches) >= self._max_probes
         return self._observe(), -1.0, ended, truncated, self._info()

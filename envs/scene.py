@@ -22,7 +22,7 @@ OBJECT, PLANE, NOTHING = 1, 2, 3
 
 LARGEST_DIAMETER = 10.0
 SMALLEST_DIAMETER = 1e-3
-"""Objects (metres) for which MuJoCo's single-precision meshes are exact to a millionth of a bound."""
+"""Diameters (metres) at which MuJoCo's single-precision meshes are still exact enough."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -89,9 +89,9 @@ class RaySensor:
         rounding = MESH_ROUNDING * scene.model.diameter
         if self.noise.position_error <= 2.0 * rounding:
             raise ValueError(
-                f"position error is {self.noise.position_error:g} m; the simulation of an object of"
-                f" {scene.model.diameter:g} m is exact to {rounding:.2g} m, so ask for more than twice"
-                " that"
+                f"position error is {self.noise.position_error:g} m; the simulation of an object"
+                f" of {scene.model.diameter:g} m is exact to {rounding:.2g} m, so ask for more"
+                " than twice that"
             )
         directions = triad_directions(yaw)
         starts = np.array([x, y, 0.0]) - self.reach * directions

@@ -14,7 +14,7 @@ class Policy(Protocol):
 
     def act(
         self, observation: Mapping[str, NDArray[np.generic]], rng: np.random.Generator
-    ) -> NDArray[np.float64]:
+    ) -> NDArray[np.float32]:
         """The next probe.
 
         Args:

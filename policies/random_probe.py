@@ -13,6 +13,6 @@ class RandomProbe:
 
     def act(
         self, observation: Mapping[str, NDArray[np.generic]], rng: np.random.Generator
-    ) -> NDArray[np.float64]:
+    ) -> NDArray[np.float32]:
         """(3,) x, y and yaw, uniform in [-1, 1]; the observation is not looked at."""
-        return rng.uniform(-1.0, 1.0, 3)
+        return rng.uniform(-1.0, 1.0, 3).astype(np.float32)

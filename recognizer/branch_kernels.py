@@ -1,7 +1,7 @@
 """Compiled branch and bound over poses: a witness, or a proof that there is none.
 
 Rotations are searched as boxes of quaternions ``q = sqrt(1 - |v|^2) q0 + V v`` about the rotation
-``q0`` that fits the normals best, along the principal axes ``V`` of that fit (Davenport's q-method).
+``q0`` that fits the normals best, along the principal axes ``V`` of that fit (Davenport's method).
 The normals' bounds confine ``v`` to an ellipsoid. A box is dropped when no pose in the ball around
 it can meet the bounds, which `feasibility_kernels.seek_in_ball` proves; otherwise it is halved.
 """

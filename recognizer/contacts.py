@@ -80,7 +80,9 @@ class Contacts:
     def __getitem__(self, rows: ArrayLike | slice) -> Contacts:
         """The contacts of the given rows (a slice, indices or a mask), in that order."""
         # An empty list is no list of numbers yet, and numpy would make it one of floats.
-        index = rows if isinstance(rows, slice) else np.asarray(rows, None if np.size(rows) else int)
+        index = (
+            rows if isinstance(rows, slice) else np.asarray(rows, None if np.size(rows) else int)
+        )
         return Contacts(
             self.positions[index],
             self.normals[index],

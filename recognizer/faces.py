@@ -191,7 +191,9 @@ def convex_pieces(vertices: Floats, triangles: Ints, normal: Floats) -> list[Flo
     hull = convex_hull_in_plane(corners, normal)
     if _doubled_area(hull, normal) - float(doubled.sum()) <= 1e-9 * size**2:
         return [hull]
-    rings = [list(map(int, ring)) for ring, area in zip(triangles, doubled, strict=True) if area > 0]
+    rings = [
+        list(map(int, ring)) for ring, area in zip(triangles, doubled, strict=True) if area > 0
+    ]
     merged = True
     while merged:
         merged = False

@@ -3,8 +3,8 @@
 With ``q`` the squared distance of a contact from its face, or the squared chord between its normal
 and the face's, and ``b`` the bound on it, each reading asks for ``g = q / b^2 - 1 <= 0``. The
 largest ``g`` is lowered by an interior-point method (Boyd and Vandenberghe, Convex Optimization,
-Section 11.4): minimise ``t s - sum log(s - g)`` over pose and ``s`` for growing ``t``. It sees every
-bound at once, those not yet touched too, so it doesn't creep along a corner between bounds as a
+Section 11.4): minimise ``t s - sum log(s - g)`` over pose and ``s`` for growing ``t``. It sees all
+bounds at once, those not yet touched too, so it doesn't creep along a corner between bounds as a
 descent on the violated ones would.
 """
 

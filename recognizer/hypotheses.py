@@ -89,9 +89,7 @@ def cluster(
     radius = model.diameter / 2.0
     most_shift = tolerance.distance(model.diameter, position_error)
     centres = poses.translations + poses.rotations @ model.centroid
-    groups = group_poses(
-        poses.rotations, centres, model.symmetries, tolerance.rotation, most_shift
-    )
+    groups = group_poses(poses.rotations, centres, model.symmetries, tolerance.rotation, most_shift)
     leaders = np.unique(groups, return_index=True)[1]
     prior = np.diag([1.0 / (np.pi * radius)] * 3 + [1.0 / radius] * 3) ** 2
     variances, motions = np.linalg.eigh(np.linalg.inv(poses.informations + prior))

@@ -26,7 +26,9 @@ def load_folder(folder: str | os.PathLike[str]) -> tuple[Polyhedron, ...]:
         raise ValueError(f"{path}: no such folder")
     files = sorted(file for file in path.iterdir() if file.suffix.lower() in MESH_ENDINGS)
     if not files:
-        raise ValueError(f"{path}: no mesh in this folder; expected files {', '.join(MESH_ENDINGS)}")
+        raise ValueError(
+            f"{path}: no mesh in this folder; expected files {', '.join(MESH_ENDINGS)}"
+        )
     names = [file.stem for file in files]
     for file in files:
         if names.count(file.stem) > 1:

@@ -14,6 +14,7 @@ from numba import njit
 
 @njit(cache=True, inline="always")
 def cross(a, b, out):
+    """Vector product of (3,) ``a`` and ``b``, into ``out``."""
     out[0] = a[1] * b[2] - a[2] * b[1]
     out[1] = a[2] * b[0] - a[0] * b[2]
     out[2] = a[0] * b[1] - a[1] * b[0]
@@ -21,6 +22,7 @@ def cross(a, b, out):
 
 @njit(cache=True)
 def to_object(points, normals, rotation, translation, x, u):
+    """Contacts and normals, (n, 3) each, from the world into the object's frame: ``x``, ``u``."""
     for i in range(len(points)):
         for k in range(3):
             x[i, k] = 0.0
@@ -32,7 +34,7 @@ def to_object(points, normals, rotation, translation, x, u):
 
 @njit(cache=True)
 def set_row(direction, x, centre, radius, row, arm, turn):
-    """Change of a length along ``direction`` at ``x`` with the six small motions."""
+    """Change of a length along ``direction`` at ``x`` with the six small motions, into ``row``."""
     for k in range(3):
         arm[k] = x[k] - centre[k]
     cross(arm, direction, turn)
@@ -43,6 +45,7 @@ def set_row(direction, x, centre, radius, row, arm, turn):
 
 @njit(cache=True)
 def add_row(row, residual, weight, system, gradient):
+    """Add a weighted residual with (6,) derivative ``row`` to normal equations."""
     for a in range(6):
         gradient[a] += weight * residual * row[a]
         for b in range(a + 1):

@@ -148,12 +148,12 @@ class Polyhedron:
         Warns:
             UserWarning: the winding was inverted or inconsistent and has been mended.
         """
-        vertices, triangles, label = _read(mesh)
-        name = name or label
+        source = "mesh" if _is_mesh(mesh) else str(mesh)
+        name = name or Path(source).stem
         try:
-            return cls._from_triangles(vertices, triangles, name)
+            return cls._from_triangles(*_read(mesh), name)
         except ValueError as error:
-            raise ValueError(f"{label}: {error}") from error
+            raise ValueError(f"{source}: {error}") from error
 
     @classmethod
     def _from_triangles(
@@ -203,39 +203,38 @@ def _doubled_areas(
     return np.linalg.norm(sides, axis=1)
 
 
+def _is_mesh(mesh: object) -> bool:
+    """Whether something is a trimesh mesh, without importing trimesh to ask."""
+    return hasattr(mesh, "vertices") and hasattr(mesh, "faces")
+
+
 def _read(
     mesh: trimesh.Trimesh | str | os.PathLike[str],
-) -> tuple[NDArray[np.float64], NDArray[np.int64], str]:
-    """Merged vertices, triangles and a label for messages."""
+) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+    """Merged vertices and triangles."""
     import trimesh  # a second of import time that a caller with ready models does not need
 
-    label = "mesh"
     if isinstance(mesh, trimesh.Trimesh):
         loaded = mesh.copy()
     elif isinstance(mesh, str | os.PathLike):
         path = Path(mesh)
-        label = path.stem
         if not path.is_file():
-            raise ValueError(f"{path}: no such mesh file")
+            raise ValueError("no such mesh file")
         try:
             loaded = trimesh.load_mesh(path, process=False)
         except Exception as error:  # trimesh raises whatever its parsers raise
-            raise ValueError(f"{path}: not a mesh that can be read ({error})") from error
-        if not isinstance(loaded, trimesh.Trimesh):
-            raise ValueError(f"{path}: holds no triangle mesh")
+            raise ValueError(f"not a mesh that can be read ({error})") from error
+        if not isinstance(loaded, trimesh.Trimesh) or not len(loaded.faces):
+            raise ValueError("not a mesh that can be read (it holds no triangles)")
     else:
         raise ValueError(f"a mesh must be a trimesh.Trimesh or a path, not {type(mesh).__name__}")
-    bad = np.flatnonzero(~np.isfinite(loaded.vertices).all(axis=1))
-    if bad.size:
-        corner = loaded.vertices[bad[0]].tolist()
-        raise ValueError(f"{label}: vertex {bad[0]} is {corner}; it must be finite")
     loaded.merge_vertices(merge_tex=True, merge_norm=True)
     triangles = np.asarray(loaded.faces, dtype=np.int64).reshape(-1, 3)
     distinct = (np.diff(np.sort(triangles, axis=1), axis=1) > 0).all(axis=1)
     triangles = triangles[distinct]
     used, triangles = np.unique(triangles, return_inverse=True)
     vertices = np.array(loaded.vertices, dtype=np.float64, order="C")[used]
-    return vertices, np.ascontiguousarray(triangles.reshape(-1, 3)), label
+    return vertices, np.ascontiguousarray(triangles.reshape(-1, 3))
 
 
 def _outward(

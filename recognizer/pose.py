@@ -2,13 +2,13 @@
 
 A pose is fitted by joint least squares on normals and plane offsets, started from the rotation
 that the normals ask for, with each contact held to its bounded face. If the fit breaks a bound, the
-pose is moved to where the bounds are broken least; only if they stay clearly broken there is the
-interpretation rejected.
+pose is moved to where all are met. If that fails, the poses are searched by branch and bound, and
+the interpretation is rejected only if each part of that search is proved to hold none.
 
 The memo (Section 3) averages rotations over pairs of normals and translations over triples of
 planes. Two of its formulas mislead: its cosine and sine of the angle, put into its own matrix, give
-the inverse rotation; and normals alone give a rotation to degrees, where offsets fitted jointly give
-it to tenths of a degree.
+the inverse rotation; and normals alone give a rotation to degrees, where offsets fitted jointly
+give it to tenths of a degree.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import RigidTransform, Rotation
 
 from . import branch_kernels, pose_kernels
 from .contacts import Contacts
@@ -104,9 +105,7 @@ class ModelTest:
         )
         return poses.take(verdicts != branch_kernels.REJECTED)
 
-    def prune(
-        self, interpretations: NDArray[np.int32], contacts: Contacts
-    ) -> NDArray[np.int32]:
+    def prune(self, interpretations: NDArray[np.int32], contacts: Contacts) -> NDArray[np.int32]:
         """Drop partial interpretations that no pose satisfies, where that is quickly shown.
 
         Args:
@@ -115,6 +114,47 @@ class ModelTest:
         """
         verdicts = self._verdicts(interpretations, contacts, pass_vague=True)[0]
         return interpretations[verdicts != branch_kernels.REJECTED]
+
+    def span(
+        self,
+        faces: NDArray[np.int32],
+        contacts: Contacts,
+        pose: RigidTransform,
+        motions: Floats,
+        step: float,
+        most: int,
+    ) -> RigidTransform:
+        """Poses that an interpretation allows, a step apart along the motions it leaves open.
+
+        Args:
+            faces: (n,) a face for each contact.
+            contacts: the n contacts.
+            pose: where to start.
+            motions: (d, 6) unit small motions: rotation about the centroid times the radius, shift.
+            step: distance between neighbours, metres.
+            most: the most poses.
+
+        Returns:
+            A stack of poses, the first of them ``pose``.
+        """
+        rotations, translations = np.empty((most, 3, 3)), np.empty((most, 3))
+        found = pose_kernels.span_family(
+            faces.astype(np.int64),
+            contacts.positions,
+            contacts.normals,
+            contacts.position_error,
+            contacts.normal_error,
+            self._model,
+            pose.rotation.as_matrix(),
+            np.array(pose.translation),
+            np.ascontiguousarray(motions),
+            step,
+            rotations,
+            translations,
+        )
+        return RigidTransform.from_components(
+            translations[:found], Rotation.from_matrix(rotations[:found])
+        )
 
     def _verdicts(
         self, interpretations: NDArray[np.int32], contacts: Contacts, *, pass_vague: bool

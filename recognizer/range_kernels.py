@@ -175,7 +175,8 @@ def tilt_ranges(triangles, first, normals, offsets):
                             gap = triangles[s, i] - flat[j]
                             far = max(far, np.sqrt(_dot(gap, gap)))
                     low = min(low, np.arctan2(near if top > 0.0 else far, top))
-                    high = max(high, np.arctan2(far if bottom > 0.0 else near, bottom))
+                    # At height zero any distance makes a right angle; no distance at all, none.
+                    high = max(high, np.arctan2(far if bottom >= 0.0 else near, bottom))
             least[a, b] = low
             most[a, b] = high
     return least, most

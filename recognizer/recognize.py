@@ -8,6 +8,7 @@ from time import perf_counter
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import RigidTransform
 
 from .belief import Belief, Search
 from .contacts import Contacts
@@ -92,9 +93,39 @@ class Recognizer:
         Raises:
             ValueError: no model of that name.
         """
+        return self._entry(name).tables
+
+    def sample_poses(
+        self, hypothesis: Hypothesis, contacts: Contacts, most: int = 256
+    ) -> RigidTransform:
+        """Poses that span a hypothesis: its own and, along the freedoms it leaves open, others.
+
+        Neighbours are half a pose tolerance apart, over the family that the hypothesis's best
+        interpretation allows, outwards from its own pose as far as ``most`` reach.
+
+        Args:
+            hypothesis: of a belief about these contacts.
+            contacts: what was felt.
+            most: the most poses.
+
+        Returns:
+            A stack of poses, model to world, the hypothesis's own first.
+        """
+        entry = self._entry(hypothesis.object_name)
+        if hypothesis.determined:
+            return RigidTransform.from_matrix(hypothesis.pose.as_matrix()[None])
+        largest = float(contacts.position_error.max())
+        diameter = entry.model.diameter
+        step = 0.5 * min(
+            self.tolerance.distance(diameter, largest), self.tolerance.rotation * diameter / 2.0
+        )
+        faces = hypothesis.interpretations[0]
+        return entry.test.span(faces, contacts, hypothesis.pose, hypothesis.freedoms, step, most)
+
+    def _entry(self, name: str) -> _Entry:
         for entry in self._entries:
             if entry.model.name == name:
-                return entry.tables
+                return entry
         known = ", ".join(model.name for model in self.models)
         raise ValueError(f"no model is called {name!r}; there are: {known}")
 

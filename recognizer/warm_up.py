@@ -1,4 +1,6 @@
-"""Compile every kernel once, so that the first real call doesn't wait: `python -m palpate.recognizer.warm_up`.
+"""Compile every kernel once, so that the first real call doesn't wait.
+
+Run as `python -m palpate.recognizer.warm_up`.
 
 numba keeps the compiled code beside the source, or in the user's cache where that is read-only.
 """

@@ -12,6 +12,7 @@ from typing import Annotated
 import typer
 
 from .episode import episode
+from .reproduce import reproduce
 
 __all__ = ["app", "main"]
 
@@ -23,6 +24,7 @@ app = typer.Typer(
     rich_markup_mode="rich",
 )
 app.command()(episode)
+app.command()(reproduce)
 
 BAD_INPUT = 2
 INTERRUPTED = 130
@@ -34,6 +36,9 @@ def main() -> None:
     What the caller got wrong (a flag, a file, a value) is one line on stderr and exit code 2;
     Ctrl-C is one line and 130. Anything else that goes wrong is a bug and keeps its traceback.
     """
+    import warnings
+
+    warnings.showwarning = tell
     try:
         code = app(standalone_mode=False)
     except (typer.TyperException, ValueError, OSError) as mistake:
@@ -43,6 +48,11 @@ def main() -> None:
     if code == INTERRUPTED:
         print("palpate: interrupted", file=sys.stderr)
     sys.exit(code)
+
+
+def tell(message: Warning | str, *_: object, **__: object) -> None:
+    """Print a warning as one line on stderr, without the source line that raised it."""
+    print("palpate:", " ".join(str(message).split()), file=sys.stderr)
 
 
 def complain(mistake: Exception) -> int:

@@ -61,9 +61,7 @@ def episode(
     ] = 0.000254,
     normal_error_deg: Annotated[
         float,
-        typer.Option(
-            metavar="A", help="A normal is felt within this angle of the truth, degrees."
-        ),
+        typer.Option(metavar="A", help="A normal is felt within this angle of the truth, degrees."),
     ] = 18.0,
     max_probes: Annotated[
         int, typer.Option(metavar="N", min=1, help="Give up after this many probes.")
@@ -79,10 +77,13 @@ def episode(
     import numpy as np
     from rich.console import Console
 
+    from ..envs.picture import check_path
     from ..envs.probe_env import ProbeEnv
     from ..policies import make_policy
 
     chooser = make_policy(policy)
+    if not no_picture:
+        check_path(picture)
     env = ProbeEnv(
         library,
         object_name=object_name,
@@ -133,6 +134,7 @@ def _told(number: int, touch: Touch, belief: Belief | None) -> str:
         f"  {_count(belief.interpretations, 'interpretation'):>20}"
         f"  {_count(left, 'hypothesis', 'hypotheses'):>14}"
         + (f"  ({rivals})" if rivals else "")
+        + ("  its pose still open" if left == 1 and not belief.hypotheses[0].determined else "")
         + ("" if belief.complete else "  search cut short")
     )
 
@@ -212,22 +214,31 @@ def _pose(pose: RigidTransform) -> str:
 
 
 def _document(env: ProbeEnv, seed: int) -> dict[str, object]:
-    """The episode as the --json document."""
+    """The episode as the --json document.
+
+    A hypothesis whose pose is not fixed stands for a family of poses: it is listed once for each
+    pose of a sample that spans it, its weight shared out, all under one ``family`` number.
+    """
     belief = env.belief
+    listed = []
+    for number, hypothesis in enumerate(belief.hypotheses if belief else ()):
+        poses = env.recognizer.sample_poses(hypothesis, env.contacts)
+        listed += [
+            {
+                "object": hypothesis.object_name,
+                "pose": pose.as_matrix().tolist(),
+                "weight": hypothesis.weight / len(poses),
+                "family": number,
+                "determined": hypothesis.determined,
+            }
+            for pose in poses
+        ]
     return {
         "truth": {
             "object": env.true_object.name,
             "pose": env.T_world_object.as_matrix().tolist(),
         },
-        "hypotheses": [
-            {
-                "object": hypothesis.object_name,
-                "pose": hypothesis.pose.as_matrix().tolist(),
-                "weight": hypothesis.weight,
-                "determined": hypothesis.determined,
-            }
-            for hypothesis in (belief.hypotheses if belief else ())
-        ],
+        "hypotheses": listed,
         "unique": belief.unique if belief else False,
         "complete": belief.complete if belief else True,
         "probes": len(env.touches),

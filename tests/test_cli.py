@@ -1,0 +1,124 @@
+"""The command line: what it prints, and what it says of bad input."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import RigidTransform
+
+from palpate.assets import mesh_path
+from palpate.recognizer import Polyhedron, pose_difference
+
+
+def palpate(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+    program = "from palpate.scripts.cli import main; main()"
+    return subprocess.run(
+        [sys.executable, "-c", program, *arguments],
+        cwd=cwd,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def test_an_episode_as_json_holds_the_truth_among_its_hypotheses(tmp_path):
+    told = palpate("episode", "--object", "simple-hand", "--json", "--no-picture", cwd=tmp_path)
+    assert told.returncode == 0, told.stderr
+    document = json.loads(told.stdout)
+    assert document["truth"]["object"] == "simple-hand"
+    assert document["seed"] == 0
+    assert document["unique"] is True
+    assert sum(entry["weight"] for entry in document["hypotheses"]) == pytest.approx(1.0)
+    hand = Polyhedron.from_mesh(mesh_path("simple-hand"))
+    truth = RigidTransform.from_matrix(document["truth"]["pose"])
+    found = RigidTransform.from_matrix(document["hypotheses"][0]["pose"])
+    error = pose_difference(hand, found, truth)
+    assert np.degrees(error.rotation) < 3.0
+    assert error.translation < 0.02 * hand.diameter
+
+
+def test_an_episode_tells_its_story_and_draws_it(tmp_path):
+    told = palpate("episode", "--object", "simple-hand", "--picture", "end.png", cwd=tmp_path)
+    assert told.returncode == 0, told.stderr
+    assert "probe  1" in told.stdout
+    assert "It is simple-hand." in told.stdout
+    assert "error" in told.stdout
+    assert (tmp_path / "end.png").stat().st_size > 10_000
+    assert [path.name for path in tmp_path.iterdir()] == ["end.png"]
+
+
+def test_the_same_seed_prints_the_same_story(tmp_path):
+    once, again = (palpate("episode", "--no-picture", cwd=tmp_path).stdout for _ in range(2))
+    assert once == again
+    assert once != palpate("episode", "--no-picture", "--seed", "5", cwd=tmp_path).stdout
+
+
+def test_an_object_that_is_never_touched_is_no_mistake(tmp_path):
+    import trimesh
+
+    library = tmp_path / "library"
+    library.mkdir()
+    trimesh.creation.box((0.002, 0.002, 0.002)).export(library / "grain.stl")
+    trimesh.creation.box((0.5, 0.5, 0.5)).export(library / "crate.stl")
+    told = palpate(
+        *("episode", "--library", "library", "--object", "grain", "--no-picture"),
+        *("--position-error", "1e-4", "--max-probes", "2"),
+        cwd=tmp_path,
+    )
+    assert told.returncode == 0, told.stderr
+    assert "No probe touched the object" in told.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("episode", "--object", "spoon"), ("'spoon'", "housing", "complex-hand")),
+        (("episode", "--policy", "psychic"), ("'psychic'", "random")),
+        (("episode", "--library", "nowhere"), ("nowhere", "no such folder")),
+        (("episode", "--library", "empty"), ("empty", "no mesh")),
+        (("episode", "--library", "broken"), ("broken", "not a mesh")),
+        (("episode", "--library", "open"), ("lid", "isn't closed")),
+        (("episode", "--position-error", "0"), ("position error", "above zero")),
+        (("episode", "--position-error", "-1"), ("position error", "above zero")),
+        (("episode", "--position-error", "nan"), ("position error", "above zero")),
+        (("episode", "--normal-error-deg", "0"), ("normal error", "above 0")),
+        (("episode", "--max-probes", "0"), ("--max-probes",)),
+        (("episode", "--seed", "x"), ("--seed", "x")),
+        (("episode", "--picture", "no/folder/x.png"), ("no/folder",)),
+        (("reproduce", "table99"), ("table99", "table2")),
+        (("juggle",), ("juggle",)),
+    ],
+)
+def test_bad_input_is_one_line_and_exit_code_2(tmp_path, arguments, words):
+    import trimesh
+
+    for folder in ("empty", "broken", "open"):
+        (tmp_path / folder).mkdir()
+    (tmp_path / "broken" / "thing.stl").write_bytes(b"solid nonsense, cut")
+    box = trimesh.creation.box()
+    trimesh.Trimesh(box.vertices, box.faces[1:], process=False).export(tmp_path / "open/lid.obj")
+    told = palpate(*arguments, cwd=tmp_path)
+    assert told.returncode == 2, told.stderr
+    assert len(told.stderr.strip().splitlines()) == 1
+    for word in words:
+        assert word in told.stderr
+
+
+def test_an_inverted_mesh_is_mended_and_said(tmp_path):
+    import trimesh
+
+    box = trimesh.creation.box((0.05, 0.06, 0.07))
+    (tmp_path / "library").mkdir()
+    inverted = trimesh.Trimesh(box.vertices, box.faces[:, ::-1], process=False)
+    inverted.export(tmp_path / "library" / "block.obj")
+    told = palpate(
+        *("episode", "--library", "library", "--no-picture", "--max-probes", "2"), cwd=tmp_path
+    )
+    assert told.returncode == 0, told.stderr
+    lines = told.stderr.strip().splitlines()
+    assert lines == ["palpate: block: its winding was inverted (normals pointed inwards); mended"]
