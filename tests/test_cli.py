@@ -88,7 +88,7 @@ def test_an_object_that_is_never_touched_is_no_mistake(tmp_path):
         (("episode", "--position-error", "nan"), ("position error", "above zero")),
         (("episode", "--normal-error-deg", "0"), ("normal error", "above 0")),
         (("episode", "--max-probes", "0"), ("--max-probes",)),
-        (("episode", "--seed", "x"), ("--seed", "x")),
+        (("episode", "--seed", "x"), ("--seed", "integer")),
         (("episode", "--picture", "no/folder/x.png"), ("no/folder",)),
         (("reproduce", "table99"), ("table99", "table2")),
         (("juggle",), ("juggle",)),
