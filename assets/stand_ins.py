@@ -58,32 +58,37 @@ def parts_m(stand_in: StandIn) -> tuple[Points, ...]:
     return tuple(np.round((part - centre) * scale, DECIMALS) for part in stand_in.parts)
 
 
-def _housing_core(body_sides: int) -> tuple[Points, ...]:
-    """Base flange, body and top flange: 10 + ``body_sides`` + 10 faces.
+def _housing() -> tuple[Points, ...]:
+    """Base flange 10, body 8, top flange 10, terminal pad 5 and lip 7 faces.
 
-    But for the flanges' thicknesses (0.6 and 0.5), rotations by pi about x, y and z map this onto
-    itself: the memo's "nearly symmetric about two axes".
+    The flanges differ by 0.06 to 0.12, and flanks of body and pad are nearly flush. Without the
+    lip, a rotation by pi about z maps this onto itself, and those about x and y nearly do, but for
+    the pad. The lip is off centre so that no mirror plane is left.
     """
-    flange = chamfered_rectangle(1.35, 1.1, 0.35)
+    tongue = [(1.1, 0.1), (1.62, 0.1), (1.8, 0.28), (1.8, 0.5), (1.62, 0.68), (1.1, 0.68)]
     return (
-        extrude(flange, "z", 0.0, 0.6),
-        extrude(regular_polygon(body_sides, 0.78), "z", 0.3, 2.0),
-        extrude(flange, "z", 1.7, 2.2),
+        extrude(chamfered_rectangle(1.36, 1.1, 0.28), "z", 0.0, 0.8),
+        extrude(chamfered_rectangle(0.97, 0.8, 0.28), "z", 0.4, 2.1),
+        extrude(chamfered_rectangle(1.3, 1.02, 0.28), "z", 1.77, 2.45),
+        box((-0.99, 0.99), (-0.6, 0.6), (2.1, 2.73)),
+        extrude(tongue, "y", -0.6, 0.36),
     )
 
 
-def _housing() -> tuple[Points, ...]:
-    """Lip of 8 faces: an L with a chamfered heel, off centre so that no mirror plane is left."""
-    foot = [(1.1, 0.18), (1.75, 0.18), (1.95, 0.34), (1.95, 0.44), (1.1, 0.44)]
-    upright = [(1.7, 0.34), (1.95, 0.34), (1.95, 0.95), (1.7, 0.95)]
-    lip = tuple(extrude(profile, "y", -0.35, 0.55) for profile in (foot, upright))
-    return (*_housing_core(12), *lip)
-
-
 def _housing_34() -> tuple[Points, ...]:
-    """Lip of 6 faces: a straight tongue with one chamfer along its upper edge."""
+    """Flanges 10 and 10, body 8, and a lip of 6 faces: a tongue with one chamfer along its edge.
+
+    But for the lip and the flanges' thicknesses (0.6 and 0.5), rotations by pi about x, y and z
+    map this onto itself: the memo's "nearly symmetric about two axes".
+    """
+    flange = chamfered_rectangle(1.35, 1.1, 0.35)
     tongue = [(1.1, 0.15), (1.95, 0.15), (1.95, 0.31), (1.8, 0.45), (1.1, 0.45)]
-    return (*_housing_core(8), extrude(tongue, "y", -0.45, 0.45))
+    return (
+        extrude(flange, "z", 0.0, 0.6),
+        extrude(regular_polygon(8, 0.78), "z", 0.3, 2.0),
+        extrude(flange, "z", 1.7, 2.2),
+        extrude(tongue, "y", -0.45, 0.45),
+    )
 
 
 def _stapler() -> tuple[Points, ...]:

@@ -228,6 +228,11 @@ def _read(
             raise ValueError("not a mesh that can be read (it holds no triangles)")
     else:
         raise ValueError(f"a mesh must be a trimesh.Trimesh or a path, not {type(mesh).__name__}")
+    # Before merging, which rounds coordinates to integers, and NaN to any.
+    bad = np.flatnonzero(~np.isfinite(loaded.vertices).all(axis=1))
+    if bad.size:
+        corner = loaded.vertices[bad[0]].tolist()
+        raise ValueError(f"vertex {bad[0]} is {corner}; it must be finite")
     loaded.merge_vertices(merge_tex=True, merge_norm=True)
     triangles = np.asarray(loaded.faces, dtype=np.int64).reshape(-1, 3)
     distinct = (np.diff(np.sort(triangles, axis=1), axis=1) > 0).all(axis=1)
@@ -244,7 +249,7 @@ def _outward(
     against = turned_against(triangles)
     if against.any():
         triangles = np.where(against[:, None], triangles[:, ::-1], triangles)
-        warnings.warn(f"{name}: its winding was inconsistent; mended", UserWarning, stacklevel=5)
+        warnings.warn(f"{name}: its winding was inconsistent; mended", UserWarning, stacklevel=4)
     corners = vertices[triangles]
     size = float(np.ptp(vertices, axis=0).max())
     volume = float(np.linalg.det(corners - vertices.mean(axis=0)).sum()) / 6.0
@@ -255,6 +260,6 @@ def _outward(
         warnings.warn(
             f"{name}: its winding was inverted (normals pointed inwards); mended",
             UserWarning,
-            stacklevel=5,
+            stacklevel=4,
         )
     return np.ascontiguousarray(triangles)

@@ -18,7 +18,8 @@ from .range_kernels import nearest_distances, tilt_ranges
 
 ROUNDING = 1e-9
 """Every range is widened by this share of the diameter (or this angle, radians): far above what
-double precision loses in building it, far below any bound on a touch."""
+double precision loses in building it, far below any bound on a touch. Lengths are widened by the
+mesh's own rounding too, see `planarity`."""
 
 Floats = NDArray[np.float64]
 
@@ -57,7 +58,7 @@ class PairTables:
         triangles = model.vertices[model.triangles[order]]
         first = np.searchsorted(model.triangle_faces[order], np.arange(model.face_count + 1))
         first = first.astype(np.int64)
-        slack = ROUNDING * model.diameter
+        slack = ROUNDING * model.diameter + planarity(model)
         farthest = farthest_distances(model)
         heights_min, heights_max = height_ranges(model)
         tilt_min, tilt_max = tilt_ranges(triangles, first, model.normals, model.offsets)
@@ -70,6 +71,13 @@ class PairTables:
             tilt_min=tilt_min - ROUNDING,
             tilt_max=tilt_max + ROUNDING,
         )
+
+
+def planarity(model: Polyhedron) -> float:
+    """How far corners lie off their faces' planes at most, metres: coordinates are rounded."""
+    faces = np.repeat(np.arange(model.face_count), np.diff(model.hulls.start))
+    heights = (model.hulls.corners * model.normals[faces]).sum(axis=1) - model.offsets[faces]
+    return float(np.abs(heights).max())
 
 
 def normal_angles(normals: Floats) -> Floats:

@@ -265,6 +265,25 @@ def test_parallel_faces_lie_close_together_where_the_counts_were_calibrated(
     assert np.diff(heights).max() < 0.1
 
 
+def test_the_housing_but_for_its_lip_is_mapped_onto_itself_by_pi_about_the_vertical() -> None:
+    corners = load("housing").vertices
+    base = corners[corners[:, 2] < corners[:, 2].min() + 1e-9]
+    corners = corners - [*base.mean(axis=0)[:2], 0.0]
+    turned = corners * [-1, -1, 1]
+    distances = np.linalg.norm(turned[:, None] - corners[None], axis=-1).min(axis=1)
+    assert np.count_nonzero(distances > 1e-9) == 12  # six corners at either end of the lip
+
+
+def test_the_housings_flanges_differ_by_more_than_the_least_noise_and_less_than_the_most() -> None:
+    mesh = load("housing")
+    low, high = (
+        np.ptp(mesh.vertices[np.abs(mesh.vertices[:, 2] - level) < 1e-9], axis=0)[:2]
+        for level in np.unique(np.round(mesh.vertices[:, 2], 9))[[0, -2]]
+    )
+    assert np.all((low - high) / 2 > 0.02 * METRES_PER_INCH)
+    assert np.all((low - high) / 2 < 0.1 * METRES_PER_INCH)
+
+
 @every_object
 def test_the_origin_is_the_centre_of_the_bounding_box(name: str) -> None:
     np.testing.assert_allclose(load(name).bounds.mean(axis=0), 0.0, atol=1e-9)

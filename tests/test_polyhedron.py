@@ -323,8 +323,9 @@ def test_a_solid_a_little_short_of_symmetric_has_no_symmetry():
 def test_an_inverted_winding_is_mended_with_a_warning():
     mesh = l_block()
     mesh.invert()
-    with pytest.warns(UserWarning, match="dented: its winding was inverted"):
+    with pytest.warns(UserWarning, match="dented: its winding was inverted") as caught:
         solid = Polyhedron.from_mesh(mesh, name="dented")
+    assert caught[0].filename == __file__
     assert_same_faces(solid, model("l-block"), 1e-12)
 
 
@@ -352,7 +353,9 @@ def test_an_open_mesh_is_refused_by_name(tmp_path):
     mesh = holed_block()
     mesh.update_faces(np.arange(len(mesh.faces)) != 5)
     mesh.export(tmp_path / "leaky.stl")
-    with pytest.raises(ValueError, match="leaky: the mesh isn't closed: 3 edges belong to one"):
+    with pytest.raises(
+        ValueError, match=r"leaky\.stl: the mesh isn't closed: 3 edges belong to one"
+    ):
         Polyhedron.from_mesh(tmp_path / "leaky.stl")
 
 
