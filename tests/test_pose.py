@@ -18,6 +18,7 @@ from palpate.envs.library import load_library
 from palpate.recognizer import Constraints, Contacts, PairTables, Polyhedron
 from palpate.recognizer.branch_kernels import _box_radius, align, rotation_at
 from palpate.recognizer.feasibility_kernels import EXCLUDED, FOUND, OPEN, seek_in_ball
+from palpate.recognizer.fit_kernels import fit_pose
 from palpate.recognizer.polygon_kernels import CORNER, EDGE, INSIDE, nearest_in_polygon
 from palpate.recognizer.pose import ModelTest, Poses
 from palpate.recognizer.tree import prune
@@ -590,6 +591,22 @@ def test_the_fit_does_not_drift_along_a_free_direction() -> None:
         poses = test.run(touches.faces[None], contacts)
         assert poses.proven.all()
         assert check(bar, pose_of(poses, 0), contacts, touches.faces).passed
+
+
+def test_the_fit_brings_a_pose_back_that_slid_off_its_faces() -> None:
+    # No plane says where along the bar the contacts are; only the ends of the flanks do.
+    bar = Polyhedron.from_mesh(box((0.3, 0.02, 0.015)), name="bar")
+    flanks = [face for face in range(6) if abs(bar.normals[face, 0]) < 0.5]
+    touches = touch_faces(bar, np.random.default_rng(25), flanks * 10)
+    contacts = exact(touches, 0.001, 0.1)
+    for slide in (-0.1, 0.05, 0.2):
+        start = touches.T_world_object * RigidTransform.from_translation([slide, 0.0, 0.0])
+        rotation, translation = start.rotation.as_matrix(), start.translation.copy()
+        felt = (*bounds_of(contacts)[:3], contacts.normal_error)
+        fit_pose(touches.faces, felt, ModelTest(bar)._model, 20, rotation, translation)
+        end = RigidTransform.from_components(translation, Rotation.from_matrix(rotation))
+        assert not check(bar, start, contacts, touches.faces).passed
+        assert check(bar, end, contacts, touches.faces, tolerance=0.05).passed
 
 
 def test_two_contacts_farther_apart_than_a_face_is_long_are_not_both_on_it() -> None:
