@@ -79,6 +79,7 @@ bench: $(DEV) $(COMPILED)
 	@$(BIN)/python -m palpate.scripts.bench
 
 soundness: $(DEV) $(COMPILED)
+	@$(BIN)/python -m palpate.scripts.soundness
 	@$(BIN)/pytest -n auto --maxprocesses 8 -m slow $(ARGS)
 
 format: $(DEV)

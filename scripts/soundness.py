@@ -1,0 +1,132 @@
+"""Play many episodes and count what a user cares about: is the truth ever lost?
+
+`make soundness`, or `python -m palpate.scripts.soundness [EPISODES]`: that many episodes an object
+(100 by default), with random probes, at 0.01 in and pi/10, at most 40 probes each.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from functools import cache
+from time import perf_counter
+
+import numpy as np
+
+from ..assets import STAND_IN_NAMES
+from ..envs.probe_env import ProbeEnv
+from ..policies import make_policy
+from ..recognizer import pose_difference
+
+NEAR_ROTATION = np.radians(3.0)
+NEAR_TRANSLATION = 0.02
+"""How near (radians; share of the diameter) a hypothesis, or some pose of its family, has to be to
+the truth to count as it: the recogniser's own tolerance for one pose."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """How one episode ended."""
+
+    object_name: str
+    seed: int
+    kept: bool
+    """The true object and pose are among the hypotheses."""
+    unique: bool
+    empty: bool
+    probes: int
+    contacts: int
+    seconds: float
+
+
+@cache
+def _environment() -> ProbeEnv:
+    """One a process: its tables take a second to build."""
+    return ProbeEnv()
+
+
+def play(object_name: str, seed: int) -> Outcome:
+    """Play one episode on a given object."""
+    env = ProbeEnv(_environment().library, object_name=object_name)
+    policy = make_policy("random")
+    rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(1)[0])
+    started = perf_counter()
+    observation, _ = env.reset(seed=seed)
+    ended = False
+    while not ended:
+        observation, _, terminated, truncated, _ = env.step(policy.act(observation, rng))
+        ended = terminated or truncated
+    belief = env.belief
+    return Outcome(
+        object_name=object_name,
+        seed=seed,
+        kept=belief is None or _holds_truth(env),
+        unique=belief is not None and belief.unique,
+        empty=belief is not None and belief.empty,
+        probes=len(env.touches),
+        contacts=len(env.contacts),
+        seconds=perf_counter() - started,
+    )
+
+
+def _holds_truth(env: ProbeEnv) -> bool:
+    model = env.true_object
+    for hypothesis in env.belief.hypotheses if env.belief else ():
+        if hypothesis.object_name != model.name:
+            continue
+        for pose in env.recognizer.sample_poses(hypothesis, env.contacts):
+            error = pose_difference(model, pose, env.T_world_object)
+            near = error.translation < NEAR_TRANSLATION * model.diameter
+            if near and error.rotation < NEAR_ROTATION:
+                return True
+    return False
+
+
+def main() -> None:
+    """Play, with a progress bar, and print a table; exit 1 if the truth was lost."""
+    from rich.console import Console
+    from rich.progress import track
+    from rich.table import Table
+
+    episodes = int(sys.argv[1]) if len(sys.argv) > 1 else 100
+    with ProcessPoolExecutor(os.cpu_count()) as workers:
+        jobs = [
+            workers.submit(play, name, seed) for seed in range(episodes) for name in STAND_IN_NAMES
+        ]
+        outcomes = [
+            job.result()
+            for job in track(as_completed(jobs), total=len(jobs), description="episodes")
+        ]
+    table = Table(
+        "object", "truth kept", "empty", "wrong", "unique", "probes", "contacts", "s", box=None
+    )
+    for column in table.columns[1:]:
+        column.justify = "right"
+    for name in STAND_IN_NAMES:
+        own = [outcome for outcome in outcomes if outcome.object_name == name]
+        table.add_row(
+            name,
+            f"{sum(o.kept for o in own)}/{len(own)}",
+            str(sum(o.empty for o in own)),
+            str(sum(o.unique and not o.kept for o in own)),
+            f"{np.mean([o.unique for o in own]):.0%}",
+            f"{np.mean([o.probes for o in own]):.1f}",
+            f"{np.mean([o.contacts for o in own]):.1f}",
+            f"{np.mean([o.seconds for o in own]):.1f}",
+        )
+    console = Console()
+    console.print(
+        "Episodes with random probes, at 0.01 in and pi/10, at most 40 probes.\n"
+        "wrong: ended with one hypothesis, and not the truth; s: mean seconds an episode.\n"
+    )
+    console.print(table)
+    lost = [outcome for outcome in outcomes if not outcome.kept]
+    for outcome in sorted(lost, key=lambda o: (o.object_name, o.seed)):
+        console.print(f"lost: --object {outcome.object_name} --seed {outcome.seed}")
+    sys.exit(1 if lost else 0)
+
+
+if __name__ == "__main__":
+    main()
