@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from gymnasium import spaces
-from numpy.typing import NDArray
 
 from ..recognizer import Belief, Contacts
 from .sensor import Touch
 
-Observation = dict[str, NDArray[np.generic]]
+Observation = dict[str, Any]
+"""Arrays by name, as `ObservationLayout.space` has them."""
 
 
 @dataclass(frozen=True, kw_only=True)

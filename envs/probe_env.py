@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -28,7 +28,7 @@ REACH = 2.0
 """Rays start this many diameters of the largest object before the point where they meet."""
 
 
-class ProbeEnv(gymnasium.Env[Observation, NDArray[np.floating]]):
+class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
     """An unknown object of a known library is touched until one hypothesis is left.
 
     ## Description
@@ -103,7 +103,7 @@ class ProbeEnv(gymnasium.Env[Observation, NDArray[np.floating]]):
     * v0: initial version.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": []}
+    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012  Gymnasium's own declaration
 
     def __init__(
         self,

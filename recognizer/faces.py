@@ -151,7 +151,8 @@ def convex_hull_in_plane(corners: Floats, normal: Floats) -> Floats:
     u = corners[last] - corners[first]
     u -= (u @ normal) * normal
     u /= np.linalg.norm(u)
-    flat = np.column_stack([corners @ u, corners @ np.cross(normal, u)])
+    v = np.asarray(np.cross(normal, u), dtype=np.float64)
+    flat: Floats = np.column_stack([corners @ u, corners @ v])
     order = np.lexsort((flat[:, 1], flat[:, 0]))
     slack = 1e-12 * float(np.ptp(flat, axis=0).max()) ** 2
 

@@ -236,6 +236,7 @@ def seek_feasible(faces, targets, contacts, model, most, rotation, translation):
             continue
         share = min(1.0, 0.3 * radius / np.sqrt(max(length, 1e-300)))
         moved = False
+        trial = np.inf
         for _ in range(30):
             for a in range(7):
                 part[a] = share * step[a]

@@ -75,7 +75,7 @@ def _maps_onto_itself(
     rotation: Floats, faces: FaceSummary, alike: NDArray[np.bool_], corners: KDTree, slack: float
 ) -> bool:
     points = np.asarray(corners.data)
-    distances, images = corners.query(points @ rotation.T)
+    distances, images = (np.atleast_1d(found) for found in corners.query(points @ rotation.T))
     if distances.max() > slack or len(np.unique(images)) != len(images):
         return False
     turned = faces.normals @ rotation.T @ faces.normals.T

@@ -130,7 +130,9 @@ def tables(name: str) -> PairTables:
 # --- Samplers -------------------------------------------------------------------------------
 
 
-def points_on(model: Polyhedron, triangles: ArrayLike, rng: np.random.Generator) -> Floats:
+def points_on(
+    model: Polyhedron, triangles: NDArray[np.integer], rng: np.random.Generator
+) -> Floats:
     """(n, 3) a point on each of the given triangles, uniform."""
     weights = rng.dirichlet(np.ones(3), np.size(triangles))
     return np.einsum("nk,nkd->nd", weights, model.vertices[model.triangles[triangles]])

@@ -55,8 +55,9 @@ def prism(
         triangles += [(a, c, b), (a, d, c)]
         triangles += [(a + layer, b + layer, c + layer), (a + layer, c + layer, d + layer)]
         for side in ((a, b), (b, c), (c, d), (d, a)):
-            if side[::-1] in sides:
-                del sides[side[::-1]]
+            back = (side[1], side[0])
+            if back in sides:
+                del sides[back]
             else:
                 sides[side] = None
     for a, b in sides:
@@ -362,7 +363,7 @@ class Oracle:
 
     def finds_a_pose(self, rng: np.random.Generator, count: int = 24) -> bool:
         for start in self.starts(rng, count):
-            result = least_squares(self.violations, start, self.slopes, max_nfev=40)
+            result = least_squares(self.violations, start, jac=self.slopes, max_nfev=40)  # pyright: ignore[reportArgumentType]  a callable is documented
             if (self.excesses(result.x[None]) <= 0.0).all():
                 return True
         return False

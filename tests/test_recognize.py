@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from dataclasses import FrozenInstanceError, fields
 
 import numpy as np
@@ -290,7 +291,7 @@ def test_recognising_changes_neither_library_nor_contacts_nor_the_global_generat
             *(getattr(t, field.name).tobytes() for t in tables for field in fields(t)),
             *(model.vertices.tobytes() + model.normals.tobytes() for model in recognizer.models),
             *(getattr(contacts, field.name).tobytes() for field in fields(contacts)),
-            np.random.get_state()[1].tobytes(),  # noqa: NPY002  the global state is the point
+            pickle.dumps(np.random.get_state()),  # noqa: NPY002  the global state is the point
         ]
 
     rng = np.random.default_rng(13)
@@ -411,11 +412,17 @@ def test_a_recogniser_takes_any_iterable_of_models(cube: Polyhedron) -> None:
 def hand_made(count: int, *, determined: bool, complete: bool) -> Belief:
     freedoms = np.zeros((0, 6)) if determined else np.eye(6)[:1]
     hypotheses = tuple(
-        Hypothesis(f"object {k}", RigidTransform.identity(), 1 / count, np.zeros((2, 3)), freedoms)
+        Hypothesis(
+            f"object {k}",
+            RigidTransform.identity(),
+            1 / count,
+            np.zeros((2, 3), np.int32),
+            freedoms,
+        )
         for k in range(count)
     )
     searches = tuple(
-        Search(f"object {k}", np.ones(3), 2, 2, 1, complete or k != 1, 0.0, 0.0, 0.0)
+        Search(f"object {k}", np.ones(3, np.int64), 2, 2, 1, complete or k != 1, 0.0, 0.0, 0.0)
         for k in range(2)
     )
     return Belief(hypotheses, searches)
