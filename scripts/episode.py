@@ -96,8 +96,10 @@ def episode(
     console = Console(highlight=False, quiet=json, soft_wrap=True)
     console.print(
         f"An unknown object, one of {len(env.library)}, lies across a plane"
-        f" (seed {seed}, positions ±{1e3 * position_error:.3g} mm,"
-        f" normals ±{normal_error_deg:.3g}°).\n"
+        f" (seed {seed}, positions ±{1e3 * position_error:.3g} mm, normals ±{normal_error_deg:.3g}°)."
+    )
+    console.print(
+        f"{'probe':<8}  {'its rays met':<20}  interpretations  hypotheses left", style="dim"
     )
     observation, _ = env.reset(seed=seed)
     ruled_out: list[tuple[Hypothesis, str]] = []
@@ -123,19 +125,18 @@ def _told(number: int, touch: Touch, belief: Belief | None) -> str:
     from ..envs.scene import NOTHING, OBJECT, PLANE
 
     names = {OBJECT: "object", PLANE: "plane", NOTHING: "nothing"}
-    met = " ".join(f"{names[int(outcome)]:<7}" for outcome in touch.outcomes)
+    met = " ".join(f"{names[int(outcome)]:<6}" for outcome in touch.outcomes)
     if belief is None:
-        return f"probe {number:>2}  {met}  not touched yet: everything is possible"
+        return f"probe {number:>2}  {met}  {'':>15}  nothing touched yet"
     per_object = Counter(hypothesis.object_name for hypothesis in belief.hypotheses)
-    rivals = ", ".join(f"{name} {count}" for name, count in per_object.most_common())
+    named = [f"{name} {count}" for name, count in per_object.most_common(3)]
+    rivals = ", ".join(named + ["…"] * (len(per_object) > 3))
     left = len(belief.hypotheses)
     return (
-        f"probe {number:>2}  {met}"
-        f"  {_count(belief.interpretations, 'interpretation'):>20}"
-        f"  {_count(left, 'hypothesis', 'hypotheses'):>14}"
-        + (f"  ({rivals})" if rivals else "")
-        + ("  its pose still open" if left == 1 and not belief.hypotheses[0].determined else "")
-        + ("" if belief.complete else "  search cut short")
+        f"probe {number:>2}  {met}  {belief.interpretations:>15}"
+        + (f"  {left}: {rivals}" if left else "  none: not in the library")
+        + (", its pose still open" if left == 1 and not belief.hypotheses[0].determined else "")
+        + ("" if belief.complete else "  (search cut short)")
     )
 
 
