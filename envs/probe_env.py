@@ -24,6 +24,8 @@ from .scene import Placement, ProbeScene
 from .sensor import RaySensor, SensorNoise, Touch
 
 INCH = 0.0254
+HALF_WIDTH = 0.375
+"""Half the side of the square that triads meet in, in diameters of the largest object."""
 REACH = 2.0
 """Rays start this many diameters of the largest object before the point where they meet."""
 
@@ -47,7 +49,8 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
     | 1 | y of the meeting point | -half width | half width |
     | 2 | yaw of the triad | -60 degrees | 60 degrees |
 
-    The half width is half the diameter of the library's largest object (`env.half_width`).
+    The half width is three eighths of the diameter of the library's largest object
+    (`env.half_width`); rays come in at a slant, so they also reach what lies somewhat outside.
 
     ## Observation Space
     A `Dict` of `Box`es. R is 3 `max_probes`, H is `hypotheses_shown`; unused rows are zero.
@@ -135,7 +138,7 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
         self._object_name = object_name
         self.recognizer = Recognizer(self.library, tolerance=tolerance, limits=limits)
         largest = max(model.diameter for model in self.library)
-        self.half_width = largest / 2.0
+        self.half_width = HALF_WIDTH * largest
         self._placement = Placement(offset=0.2 * self.half_width)
         self._sensor = RaySensor(noise, REACH * largest)
         self._scenes: dict[str, ProbeScene] = {}

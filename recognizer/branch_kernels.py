@@ -3,7 +3,7 @@
 Rotations are searched as boxes of quaternions ``q = sqrt(1 - |v|^2) q0 + V v`` about the rotation
 ``q0`` that fits the normals best, along the principal axes ``V`` of that fit (Davenport's method).
 The normals' bounds confine ``v`` to an ellipsoid. A box is dropped when no pose in the ball around
-it can meet the bounds, which `feasibility_kernels.seek_in_ball` proves; otherwise it is halved.
+it can meet the bounds, which `ball_kernels.seek_in_ball` proves; otherwise it is halved.
 """
 
 from __future__ import annotations
@@ -11,14 +11,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from .feasibility_kernels import (
-    EXACT,
-    EXCLUDED,
-    UNKNOWN_NORMAL,
-    seek_feasible,
-    seek_in_ball,
-    worst_excess,
-)
+from .ball_kernels import EXCLUDED, seek_in_ball
+from .feasibility_kernels import EXACT, UNKNOWN_NORMAL, seek_feasible, worst_excess
 from .motion_kernels import move, to_object
 
 REJECTED, FEASIBLE, UNDECIDED = 0, 1, 2

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from .motion_kernels import add_row, cross, move, set_row, solve, to_object
+from .motion_kernels import add_row, cross, move, slope_row, solve, to_object
 from .polygon_kernels import INSIDE, nearest_in_polygon
 
 
@@ -46,7 +46,9 @@ def assemble_fit(bounded, x, u, faces, contacts, model, system, gradient):
         bound = position_error[i]
         # A point uniform in a ball has variance bound^2 / 5 along any axis.
         weight = 5.0 / (bound * bound)
-        set_row(m, x[i], centre, radius, row, arm, turn)
+        for k in range(3):
+            arm[k] = x[i, k] - centre[k]
+        slope_row(m, arm, radius, turn, row)
         add_row(row, height, weight, system, gradient)
         cost += weight * height * height
         if bounded and region != INSIDE:
@@ -54,7 +56,7 @@ def assemble_fit(bounded, x, u, faces, contacts, model, system, gradient):
             if outside > bound:
                 for k in range(3):
                     direction[k] = (x[i, k] - height * m[k] - nearest[k]) / outside
-                set_row(direction, x[i], centre, radius, row, arm, turn)
+                slope_row(direction, arm, radius, turn, row)
                 excess = outside - bound
                 add_row(row, excess, weight, system, gradient)
                 cost += weight * excess * excess

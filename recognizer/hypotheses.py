@@ -26,7 +26,7 @@ class PoseTolerance:
 
     rotation: float = np.radians(3.0)
     """Largest rotation between them, radians."""
-    translation: float = 0.02
+    translation: float = 0.01
     """Largest distance between their centroids, as a share of the object's diameter, ..."""
     position_errors: float = 2.0
     """... or this many bounds on position, whichever is more."""
@@ -94,12 +94,13 @@ def cluster(
     prior = np.diag([1.0 / (np.pi * radius)] * 3 + [1.0 / radius] * 3) ** 2
     variances, motions = np.linalg.eigh(np.linalg.inv(poses.informations + prior))
     log_volumes = 0.5 * np.log(variances).sum(axis=1) + np.log(len(model.symmetries))
-    # Two standard deviations of each motion, against what the tolerance allows it.
+    # Three standard deviations of each motion, against what the tolerance allows it: with bounded
+    # noise hardly any fit is off by more.
     allowed = min(tolerance.rotation * radius, most_shift)
     hypotheses, log_weights = [], np.empty(len(leaders))
     for group, leader in enumerate(leaders):
         members = np.flatnonzero(groups == group)
-        open_motions = 2.0 * np.sqrt(variances[leader]) > allowed
+        open_motions = 3.0 * np.sqrt(variances[leader]) > allowed
         hypotheses.append(
             Hypothesis(
                 object_name=model.name,

@@ -33,10 +33,11 @@ def to_object(points, normals, rotation, translation, x, u):
 
 
 @njit(cache=True)
-def set_row(direction, x, centre, radius, row, arm, turn):
-    """Change of a length along ``direction`` at ``x`` with the six small motions, into ``row``."""
-    for k in range(3):
-        arm[k] = x[k] - centre[k]
+def slope_row(direction, arm, radius, turn, row):
+    """Change of a length along ``direction`` at the end of ``arm`` with the small motions.
+
+    Written into (6,) ``row``; (3,) ``turn`` is work space.
+    """
     cross(arm, direction, turn)
     for k in range(3):
         row[k] = -turn[k] / radius

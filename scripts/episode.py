@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 __all__ = ["episode"]
 
+MOST_POSES = 4000
+"""How many poses the JSON document lists of all families together, one a hypothesis at least."""
 MOST_GHOSTS = 2
 """More rivals than this in one picture hide each other."""
 
@@ -95,8 +97,8 @@ def episode(
     rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(1)[0])
     console = Console(highlight=False, quiet=json, soft_wrap=True)
     console.print(
-        f"An unknown object, one of {len(env.library)}, lies across a plane"
-        f" (seed {seed}, positions ±{1e3 * position_error:.3g} mm, normals ±{normal_error_deg:.3g}°)."
+        f"An unknown object, one of {len(env.library)}, lies across a plane (seed {seed},"
+        f" positions ±{1e3 * position_error:.3g} mm, normals ±{normal_error_deg:.3g}°)."
     )
     console.print(
         f"{'probe':<8}  {'its rays met':<20}  interpretations  hypotheses left", style="dim"
@@ -221,7 +223,8 @@ def _document(env: ProbeEnv, seed: int) -> dict[str, object]:
     belief = env.belief
     listed = []
     for number, hypothesis in enumerate(belief.hypotheses if belief else ()):
-        poses = env.recognizer.sample_poses(hypothesis, env.contacts)
+        share = max(1, MOST_POSES // len(belief.hypotheses)) if belief else 1
+        poses = env.recognizer.sample_poses(hypothesis, env.contacts, share)
         listed += [
             {
                 "object": hypothesis.object_name,

@@ -14,16 +14,19 @@ from functools import cache
 from time import perf_counter
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..assets import STAND_IN_NAMES
 from ..envs.probe_env import ProbeEnv
+from ..envs.scene import OBJECT
 from ..policies import make_policy
 from ..recognizer import pose_difference
+from ..recognizer.rays import cast_rays
 
 NEAR_ROTATION = np.radians(3.0)
-NEAR_TRANSLATION = 0.02
-"""How near (radians; share of the diameter) a hypothesis, or some pose of its family, has to be to
-the truth to count as it: the recogniser's own tolerance for one pose."""
+NEAR_TRANSLATION = 0.01
+"""How near (radians; share of the diameter) a pose that the contacts fix has to be to the truth:
+the recogniser's own tolerance for one pose."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +36,7 @@ class Outcome:
     object_name: str
     seed: int
     kept: bool
-    """The true object and pose are among the hypotheses."""
+    """The true interpretation is among the hypotheses and, where it fixes the pose, so is that."""
     unique: bool
     empty: bool
     probes: int
@@ -71,16 +74,31 @@ def play(object_name: str, seed: int) -> Outcome:
     )
 
 
+def _true_faces(env: ProbeEnv) -> NDArray[np.int64]:
+    """(n,) the face that each contact so far was really on."""
+    faces = []
+    for touch in env.touches:
+        meeting = touch.starts_world.mean(axis=0) * (1.0, 1.0, 0.0)
+        directions = meeting - touch.starts_world
+        directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+        hits = cast_rays(env.true_object, env.T_world_object, touch.starts_world, directions)
+        faces.append(hits.faces[touch.outcomes == OBJECT])
+    return np.concatenate(faces)
+
+
 def _holds_truth(env: ProbeEnv) -> bool:
-    model = env.true_object
+    """Whether some hypothesis has the true interpretation and, if it fixes the pose, that too."""
+    model, true_faces = env.true_object, _true_faces(env)
     for hypothesis in env.belief.hypotheses if env.belief else ():
         if hypothesis.object_name != model.name:
             continue
-        for pose in env.recognizer.sample_poses(hypothesis, env.contacts):
-            error = pose_difference(model, pose, env.T_world_object)
-            near = error.translation < NEAR_TRANSLATION * model.diameter
-            if near and error.rotation < NEAR_ROTATION:
-                return True
+        if (hypothesis.interpretations == true_faces).all(axis=1).any():
+            error = pose_difference(model, hypothesis.pose, env.T_world_object)
+            near = (
+                error.rotation < NEAR_ROTATION
+                and error.translation < NEAR_TRANSLATION * model.diameter
+            )
+            return near or not hypothesis.determined
     return False
 
 

@@ -16,8 +16,8 @@ from sensing import INCH, Touches, exact, feel, move, random_pose, sense_grid, t
 from palpate.assets import STAND_IN_NAMES
 from palpate.envs.library import load_library
 from palpate.recognizer import Constraints, Contacts, PairTables, Polyhedron
+from palpate.recognizer.ball_kernels import EXCLUDED, FOUND, OPEN, seek_in_ball
 from palpate.recognizer.branch_kernels import _box_radius, align, rotation_at
-from palpate.recognizer.feasibility_kernels import EXCLUDED, FOUND, OPEN, seek_in_ball
 from palpate.recognizer.fit_kernels import fit_pose
 from palpate.recognizer.polygon_kernels import CORNER, EDGE, INSIDE, nearest_in_polygon
 from palpate.recognizer.pose import ModelTest, Poses
