@@ -82,8 +82,8 @@ def _table2(trials: int, seed: int) -> None:
     console = Console()
     console.print(
         f"Interpretations after local pruning (memo, Table II), {trials} trials a row.\n"
-        "Counts are least/median/90th percentile/most; dist is in inches; the ratio is that of\n"
-        f"the medians, marked where it is beyond a factor of {FACTOR:g}.\n"
+        "Counts are least/median/90th percentile/most; dist is in inches; the ratio is\n"
+        f"that of the medians, marked where it is beyond a factor of {FACTOR:g}.\n"
     )
     console.print(shown)
     console.print(
