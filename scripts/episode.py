@@ -150,10 +150,10 @@ def _ruled_out(
     env: ProbeEnv, before: Belief, after: Belief, probe: int
 ) -> list[tuple[Hypothesis, str]]:
     """Hypotheses of one belief that no hypothesis of the next resembles, heaviest first."""
-    from ..recognizer import PoseTolerance, pose_difference
+    from ..recognizer import pose_difference
 
     models = {model.name: model for model in env.library}
-    tolerance = PoseTolerance()
+    tolerance = env.recognizer.tolerance
     gone = []
     for old in before.hypotheses:
         model = models[old.object_name]

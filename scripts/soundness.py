@@ -45,14 +45,14 @@ class Outcome:
 
 
 @cache
-def _environment() -> ProbeEnv:
-    """One a process: its tables take a second to build."""
-    return ProbeEnv()
+def _environment(object_name: str) -> ProbeEnv:
+    """One an object and process: its tables take a second to build."""
+    return ProbeEnv(object_name=object_name)
 
 
 def play(object_name: str, seed: int) -> Outcome:
     """Play one episode on a given object."""
-    env = ProbeEnv(_environment().library, object_name=object_name)
+    env = _environment(object_name)
     policy = make_policy("random")
     rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(1)[0])
     started = perf_counter()
