@@ -18,13 +18,14 @@ class Contacts:
 
     A bound is a promise: the true point of contact lies within ``position_error`` of the reading
     and the true outward normal within ``normal_error`` of it (memo, Section 1.1). Everything that
-    palpate rules out rests on these promises.
+    palpate rules out rests on these promises. In the plane (three degrees of freedom) points and
+    normals have two coordinates.
     """
 
     positions: NDArray[np.float64]
-    """(n, 3) points in the world frame, metres."""
+    """(n, 3) or (n, 2) points in the world frame, metres."""
     normals: NDArray[np.float64]
-    """(n, 3) unit outward normals in the world frame."""
+    """(n, 3) or (n, 2) unit outward normals in the world frame; any where the bound is pi."""
     position_error: NDArray[np.float64]
     """(n,) radius of the ball around each position, metres."""
     normal_error: NDArray[np.float64]
@@ -33,29 +34,50 @@ class Contacts:
     def __init__(
         self,
         positions: ArrayLike,
-        normals: ArrayLike,
+        normals: ArrayLike | None = None,
         *,
         position_error: ArrayLike,
-        normal_error: ArrayLike,
+        normal_error: ArrayLike | None = None,
     ) -> None:
         """Check and hold contacts; every array is copied and made read-only.
 
         Args:
-            positions: (n, 3) points in the world frame, metres.
-            normals: (n, 3) outward unit normals in the world frame.
+            positions: (n, 3) points in the world frame, metres; (n, 2) in the plane.
+            normals: outward unit normals in the world frame, of the same shape; a row of NaN, or
+                none at all, where the normal is unknown.
             position_error: bound on each position, metres; one number or (n,).
-            normal_error: bound on each normal, radians; one number or (n,).
+            normal_error: bound on each normal, radians; one number or (n,). Needed with normals;
+                where a normal is unknown it is pi, whatever is given.
 
         Raises:
             ValueError: a shape that does not fit, a value that is not finite, a normal that is
-                not of unit length, a bound that is not positive, a normal bound above pi.
+                not of unit length, a bound that is not positive, a normal bound above pi, normals
+                without a bound or a bound without normals.
         """
-        points = _rows_of_three("positions", positions)
-        directions = _rows_of_three("normals", normals)
-        if len(points) != len(directions):
+        points = _rows("positions", positions)
+        count, dimension = points.shape
+        cones = _bounds(
+            "normal_error", np.pi if normal_error is None else normal_error, count, np.pi
+        )
+        if normals is None:
+            if (cones < np.pi).any():
+                raise ValueError("a normal_error below pi, but no normals: give both or neither")
+            directions = np.full(points.shape, np.nan)
+        else:
+            directions = _rows("normals", normals, missing=True)
+        if len(directions) != count:
             raise ValueError(
-                f"{len(points)} positions but {len(directions)} normals: give one normal a position"
+                f"{count} positions but {len(directions)} normals: give one normal a position"
             )
+        if directions.shape[1] != dimension:
+            raise ValueError(
+                f"positions have {dimension} coordinates but normals {directions.shape[1]}"
+            )
+        unknown = np.isnan(directions).all(axis=1)
+        if normal_error is None and not unknown.all():
+            raise ValueError("normals without normal_error: say how far off they may be, radians")
+        directions[unknown] = np.eye(dimension)[0]
+        cones[unknown] = np.pi
         lengths = np.linalg.norm(directions, axis=1)
         off = np.flatnonzero(np.abs(lengths - 1.0) > UNIT_NORMAL_TOLERANCE)
         if off.size:
@@ -63,19 +85,34 @@ class Contacts:
             raise ValueError(
                 f"normals: row {row} has length {lengths[row]:.6g}; normals must be unit vectors"
             )
-        directions = directions / lengths[:, None] if len(lengths) else directions
-        values = {
-            "positions": points,
-            "normals": directions,
-            "position_error": _bounds("position_error", position_error, len(points), np.inf),
-            "normal_error": _bounds("normal_error", normal_error, len(points), np.pi),
-        }
-        for name, value in values.items():
+        self._hold(
+            points,
+            directions / lengths[:, None],
+            _bounds("position_error", position_error, count, np.inf),
+            cones,
+        )
+
+    def _hold(
+        self,
+        positions: NDArray[np.float64],
+        normals: NDArray[np.float64],
+        position_error: NDArray[np.float64],
+        normal_error: NDArray[np.float64],
+    ) -> None:
+        """Take over arrays that are known to be good."""
+        values = (positions, normals, position_error, normal_error)
+        names = ("positions", "normals", "position_error", "normal_error")
+        for name, value in zip(names, values, strict=True):
             value.setflags(write=False)
             object.__setattr__(self, name, value)
 
     def __len__(self) -> int:
         return len(self.positions)
+
+    @property
+    def dimension(self) -> int:
+        """3 in space, 2 in the plane."""
+        return self.positions.shape[1]
 
     def __getitem__(self, rows: ArrayLike | slice) -> Contacts:
         """The contacts of the given rows (a slice, indices or a mask), in that order."""
@@ -83,23 +120,32 @@ class Contacts:
         index = (
             rows if isinstance(rows, slice) else np.asarray(rows, None if np.size(rows) else int)
         )
-        return Contacts(
-            self.positions[index],
-            self.normals[index],
-            position_error=self.position_error[index],
-            normal_error=self.normal_error[index],
+        part = object.__new__(Contacts)
+        part._hold(
+            np.ascontiguousarray(self.positions[index]),
+            np.ascontiguousarray(self.normals[index]),
+            np.ascontiguousarray(self.position_error[index]),
+            np.ascontiguousarray(self.normal_error[index]),
         )
+        return part
 
     @classmethod
-    def none(cls) -> Contacts:
+    def none(cls, dimension: int = 3) -> Contacts:
         """No contacts at all."""
-        nothing = np.zeros((0, 3))
+        nothing = np.zeros((0, dimension))
         return cls(nothing, nothing, position_error=np.zeros(0), normal_error=np.zeros(0))
 
     @classmethod
     def join(cls, parts: Sequence[Contacts]) -> Contacts:
-        """All contacts of ``parts``, in order."""
-        parts = [cls.none(), *parts]
+        """All contacts of ``parts``, in order.
+
+        Raises:
+            ValueError: contacts of the plane among contacts of space.
+        """
+        dimensions = {part.dimension for part in parts}
+        if len(dimensions) > 1:
+            raise ValueError("contacts of the plane (n, 2) and of space (n, 3) can't be joined")
+        parts = [cls.none(*dimensions), *parts]
         return cls(
             np.concatenate([part.positions for part in parts]),
             np.concatenate([part.normals for part in parts]),
@@ -108,11 +154,14 @@ class Contacts:
         )
 
 
-def _rows_of_three(name: str, values: ArrayLike) -> NDArray[np.float64]:
+def _rows(name: str, values: ArrayLike, *, missing: bool = False) -> NDArray[np.float64]:
     rows = np.array(values, dtype=np.float64, order="C")
-    if rows.ndim != 2 or rows.shape[1] != 3:
-        raise ValueError(f"{name} must have shape (n, 3), not {rows.shape}")
-    bad = np.flatnonzero(~np.isfinite(rows).all(axis=1))
+    if rows.ndim != 2 or rows.shape[1] not in (2, 3):
+        raise ValueError(f"{name} must have shape (n, 3), or (n, 2) in the plane, not {rows.shape}")
+    good = np.isfinite(rows).all(axis=1)
+    if missing:
+        good |= np.isnan(rows).all(axis=1)
+    bad = np.flatnonzero(~good)
     if bad.size:
         raise ValueError(f"{name}: row {bad[0]} is {rows[bad[0]].tolist()}; it must be finite")
     return rows

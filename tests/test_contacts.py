@@ -29,13 +29,16 @@ def contacts(count: int = 3, seed: int = 0) -> Contacts:
     [
         ({"positions": [[0, np.nan, 0]]}, r"positions: row 0 is \[0.0, nan, 0.0\]; .* finite"),
         ({"positions": [[0, 0, np.inf]]}, r"positions: row 0 .* finite"),
-        ({"positions": [0, 0, 0]}, r"positions must have shape \(n, 3\), not \(3,\)"),
-        ({"positions": [[0, 0]]}, r"positions must have shape \(n, 3\), not \(1, 2\)"),
+        ({"positions": [0, 0, 0]}, r"positions must have shape \(n, 3\), or .*, not \(3,\)"),
+        ({"positions": [[0] * 4]}, r"positions must have shape \(n, 3\), or .*, not \(1, 4\)"),
+        ({"positions": [[0, 0]]}, r"positions have 2 coordinates but normals 3"),
         ({"normals": [[0, 0, np.nan]]}, r"normals: row 0 .* finite"),
-        ({"normals": [[[0, 0, 1]]]}, r"normals must have shape \(n, 3\), not \(1, 1, 3\)"),
+        ({"normals": [[[0, 0, 1]]]}, r"normals must have shape \(n, 3\), or .*, not \(1, 1, 3\)"),
         ({"normals": [[0, 0, 1.01]]}, r"normals: row 0 has length 1.01; .* unit"),
         ({"normals": [[0, 0, 0]]}, r"normals: row 0 has length 0; .* unit"),
         ({"normals": UP * 2}, r"1 positions but 2 normals"),
+        ({"normals": None}, r"normal_error below pi, but no normals"),
+        ({"normal_error": None}, r"normals without normal_error"),
         ({"position_error": 0.0}, r"position_error: row 0 is 0; .* above zero$"),
         ({"position_error": -1e-3}, r"position_error: row 0 is -0.001"),
         ({"position_error": [np.inf]}, r"position_error: row 0 is inf"),
@@ -83,6 +86,30 @@ def test_one_bound_for_all_is_the_same_as_one_bound_each():
 
 def test_a_normal_bound_of_pi_says_that_the_normal_is_unknown():
     assert Contacts([[0, 0, 0]], UP, position_error=1.0, normal_error=np.pi).normal_error == np.pi
+
+
+def test_contacts_without_normals_know_none_whatever_way_they_are_given():
+    points = np.arange(6.0).reshape(2, 3)
+    for felt in (
+        Contacts(points, position_error=1e-3),
+        Contacts(points, np.full((2, 3), np.nan), position_error=1e-3, normal_error=0.2),
+        Contacts(points, UP * 2, position_error=1e-3, normal_error=np.pi),
+    ):
+        np.testing.assert_array_equal(felt.normal_error, np.pi)
+        np.testing.assert_allclose(np.linalg.norm(felt.normals, axis=1), 1.0)
+
+
+def test_one_missing_normal_among_others_is_unknown_alone():
+    felt = Contacts(np.zeros((2, 3)), [UP[0], [np.nan] * 3], position_error=1, normal_error=0.2)
+    np.testing.assert_array_equal(felt.normal_error, [0.2, np.pi])
+
+
+def test_contacts_of_the_plane_have_two_coordinates_and_join_none_of_space():
+    flat = Contacts([[0, 1]], [[0, 1]], position_error=1, normal_error=1)
+    assert flat.dimension == 2
+    assert len(Contacts.join([flat, flat[:0]])) == 1
+    with pytest.raises(ValueError, match="plane .* and of space"):
+        Contacts.join([flat, contacts()])
 
 
 def test_normals_rounded_as_text_are_made_unit():
