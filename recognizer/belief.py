@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .contacts import Contacts
 from .hypotheses import Hypothesis
+
+if TYPE_CHECKING:
+    from .recognize import Recognizer
 
 
 @dataclass(frozen=True, eq=False)
@@ -16,7 +21,7 @@ class Search:
 
     object_name: str
     nodes: NDArray[np.int64]
-    """(n,) interpretations seen at each level of the tree, in the order of the search."""
+    """(n,) branches seen at each level of the tree, in the order of the search."""
     pruned: int
     """Interpretations left by the tree, before the last model test."""
     tested: int
@@ -24,13 +29,18 @@ class Search:
     hypotheses: int
     """Distinct poses among them."""
     complete: bool
-    """False if the budget ran out, so that hypotheses may be missing."""
-    tree_seconds: float
-    """Time for masks and tree."""
-    pose_seconds: float
-    """Time for model tests."""
+    """False if a budget ran out, so that hypotheses may be missing."""
+    boxes: int
+    """Boxes of rotations looked at for what one verdict left open."""
+    search_seconds: float
+    """Time for masks, tree and model tests."""
     cluster_seconds: float
     """Time for grouping."""
+
+    @classmethod
+    def none(cls, object_name: str, contacts: int) -> Search:
+        """Of a model that was ruled out at once."""
+        return cls(object_name, np.zeros(contacts, np.int64), 0, 0, 0, True, 0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +53,23 @@ class Belief:
     hypotheses: tuple[Hypothesis, ...]
     searches: tuple[Search, ...]
     """One a model, in the library's order."""
+    contacts: Contacts
+    """What was felt."""
+    recognizer: Recognizer
+    """Who said so."""
+    outliers: int = 0
+    """How many contacts could have been on no object."""
+
+    def update(self, contacts: Contacts) -> Belief:
+        """The belief after further contacts: the same as of all of them from the start.
+
+        Args:
+            contacts: the new ones.
+
+        Raises:
+            ValueError: contacts of the plane for a library in space, or the other way round.
+        """
+        return self.recognizer.extend(self, contacts)
 
     @property
     def complete(self) -> bool:

@@ -13,13 +13,15 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from .motion_kernels import cross, move, slope_row, solve, to_object
-from .polygon_kernels import CORNER, INSIDE, nearest_in_polygon
+from .motion_kernels import cross, move, slope_row, solve
+from .polygon_kernels import CORNER, INSIDE
+from .proof_kernels import disprove
+from .reading_kernels import ARC, NO_CONE, carry, read
+from .region_kernels import turn_between
+from .verdict_kernels import FEASIBLE, REJECTED, UNDECIDED
 
 EXACT = 1e-9
 """What the largest ``g`` of a witness may be: rounding."""
-UNKNOWN_NORMAL = 2.0
-"""A chord no two unit vectors exceed: a bound this wide says nothing."""
 
 
 @njit(cache=True)
@@ -30,44 +32,44 @@ def _outer(row, weight, system):
 
 
 @njit(cache=True)
-def assemble_barrier(
-    level, x, u, arms, bases, faces, targets, reaches, chords, model, system, gradient
-):
+def _assemble_barrier(level, count, faces, x, u, model, contacts, readings, system, gradient):
     """Value and derivatives of ``-sum log(level - g)`` at one pose and level.
 
     Args:
         level: the ``s`` of the barrier.
+        count: how many contacts count.
+        faces: (n,) the feature of each contact, -1 for none.
         x: (n, 3) contacts, object frame.
         u: (n, 3) measured normals, object frame.
-        arms: (n, 3) lever of each contact: a small rotation w changes x by ``-w x arm``.
-        bases: (n, 3) lever of each normal: w changes u by ``base x w``.
-        faces: (n,) the face of each contact.
-        targets: (n,) the polygon that stands for that face.
-        reaches: (n,) bounds on distances, metres.
-        chords: (n,) bounds on chords between normals.
-        model: see `pose_kernels.test_interpretations`.
+        model: see `search_kernels.search_model`.
+        contacts: likewise.
+        readings: see `reading_kernels.read`.
         system: (7, 7) lower triangle of the Hessian in motion and level, written in place.
         gradient: (7,) written in place.
 
     Returns:
         The value, infinity if some ``g`` is not below the level.
     """
-    normals, offsets, _, start, corners, _, radius = model
+    normals, centre, radius = model[0], model[5], model[6]
+    _, _, reaches, chords, sines = contacts
+    gaps, lengths, heights, regions, kinds, misses, directions = readings
     up = np.empty(6)
     out = np.empty(6)
     slope = np.empty(6)
     turn = np.empty(3)
-    nearest = np.empty(3)
+    arm = np.empty(3)
     direction = np.empty(3)
     system[:] = 0.0
     gradient[:] = 0.0
     value = 0.0
-    for i in range(len(x)):
-        m = normals[faces[i]]
-        p = targets[i]
-        squared, height, region = nearest_in_polygon(
-            x[i], m, offsets[faces[i]], corners, start[p], start[p + 1], nearest
-        )
+    for i in range(count):
+        f = faces[i]
+        if f < 0:
+            continue
+        m = normals[f]
+        for k in range(3):
+            arm[k] = x[i, k] - centre[k]
+        squared, height = lengths[i] * lengths[i], heights[i]
         inverse = 1.0 / (reaches[i] * reaches[i])
         room = level - (squared * inverse - 1.0)
         if room <= 0.0:
@@ -75,22 +77,22 @@ def assemble_barrier(
         value -= np.log(room)
         hold = 1.0 / room
         bend = 2.0 * inverse * hold
-        slope_row(m, arms[i], radius, turn, up)
+        slope_row(m, arm, radius, turn, up)
         _outer(up, bend, system)
         for a in range(6):
             slope[a] = 2.0 * inverse * height * up[a]
         outside = np.sqrt(max(squared - height * height, 0.0))
-        if region != INSIDE and outside > 0.0:
+        if regions[i] != INSIDE and outside > 0.0:
             for k in range(3):
-                direction[k] = (x[i, k] - height * m[k] - nearest[k]) / outside
-            slope_row(direction, arms[i], radius, turn, out)
+                direction[k] = (gaps[i, k] - height * m[k]) / outside
+            slope_row(direction, arm, radius, turn, out)
             _outer(out, bend, system)
             for a in range(6):
                 slope[a] += 2.0 * inverse * outside * out[a]
-            if region == CORNER:
+            if regions[i] == CORNER:
                 cross(m, direction, turn)
                 direction[:] = turn
-                slope_row(direction, arms[i], radius, turn, out)
+                slope_row(direction, arm, radius, turn, out)
                 _outer(out, bend, system)
         _outer(slope, hold * hold, system)
         for a in range(6):
@@ -98,109 +100,110 @@ def assemble_barrier(
             system[6, a] -= hold * hold * slope[a]
         gradient[6] -= hold
         system[6, 6] += hold * hold
-        if chords[i] >= UNKNOWN_NORMAL:
+        if kinds[i] == NO_CONE:
             continue
-        inverse = 1.0 / (chords[i] * chords[i])
-        squared = 0.0
-        length = 0.0
-        for a in range(3):
-            direction[a] = u[i, a] - m[a]
-            squared += direction[a] * direction[a]
-            length += bases[i, a] * bases[i, a]
-        room = level - (squared * inverse - 1.0)
+        bound = sines[i] if kinds[i] == ARC else chords[i]
+        inverse = 1.0 / (bound * bound)
+        room = level - (misses[i] * misses[i] * inverse - 1.0)
         if room <= 0.0:
             return np.inf
         value -= np.log(room)
         hold = 1.0 / room
-        # |u + b x w - m|^2 changes by 2 (u - m) . (b x w) = 2 w . ((u - m) x b).
-        cross(direction, bases[i], turn)
+        # A turn w changes u by u x w, and the miss along e by e . (u x w) = w . (e x u).
+        cross(directions[i], u[i], turn)
         bend = 2.0 * inverse * hold / (radius * radius)
         for a in range(3):
-            slope[a] = 2.0 * inverse * turn[a] / radius
+            slope[a] = 2.0 * inverse * misses[i] * turn[a] / radius
             gradient[a] += hold * slope[a]
             system[6, a] -= hold * hold * slope[a]
-            system[a, a] += bend * length
+            if kinds[i] != ARC:
+                system[a, a] += bend
             for b in range(a + 1):
                 system[a, b] += hold * hold * slope[a] * slope[b]
-                system[a, b] -= bend * bases[i, a] * bases[i, b]
+                if kinds[i] == ARC:
+                    system[a, b] += bend * turn[a] * turn[b]
+                else:
+                    system[a, b] -= bend * u[i, a] * u[i, b]
         gradient[6] -= hold
         system[6, 6] += hold * hold
     return value
 
 
 @njit(cache=True)
-def worst_excess(x, u, faces, targets, reaches, chords, model, exact):
-    """The largest ``g``, and the contact whose distance is worst.
-
-    With ``exact`` a contact whose target is its face's hull is measured against the face itself.
-    Other arguments as in `assemble_barrier`.
-    """
-    normals, offsets, first, start, corners, _, _ = model
-    nearest = np.empty(3)
-    worst = -1.0
-    worst_distance = -np.inf
-    where = 0
-    for i in range(len(x)):
-        f = faces[i]
-        low, high = targets[i], targets[i] + 1
-        if exact and targets[i] == f:
-            low, high = first[f], first[f + 1]
-        squared = np.inf
-        for k in range(low, high):
-            gap, _, _ = nearest_in_polygon(
-                x[i], normals[f], offsets[f], corners, start[k], start[k + 1], nearest
-            )
-            squared = min(squared, gap)
-        excess = squared / (reaches[i] * reaches[i]) - 1.0
-        if excess > worst_distance:
-            worst_distance = excess
-            where = i
-        worst = max(worst, excess)
-        if chords[i] < UNKNOWN_NORMAL:
-            squared = 0.0
-            for a in range(3):
-                squared += (u[i, a] - normals[f, a]) ** 2
-            worst = max(worst, squared / (chords[i] * chords[i]) - 1.0)
-    return worst, where
+def _add_ball(level, turn, angle, radius, system, gradient):
+    """The same for a rotation that is to stay in a ball; returns the value."""
+    squared = 0.0
+    for a in range(3):
+        squared += turn[a] * turn[a]
+    room = level - (squared / (angle * angle) - 1.0)
+    if room <= 0.0:
+        return np.inf
+    hold = 1.0 / room
+    bend = 2.0 / (angle * angle * radius * radius)
+    for a in range(3):
+        # The rotation vector from the ball's centre to the pose grows with a small motion.
+        slope = bend * turn[a] * radius
+        gradient[a] += hold * slope
+        system[6, a] -= hold * hold * slope
+        system[a, a] += hold * bend
+        for b in range(a + 1):
+            system[a, b] += hold * hold * slope * bend * turn[b] * radius
+    gradient[6] -= hold
+    system[6, 6] += hold * hold
+    return -np.log(room)
 
 
 @njit(cache=True)
-def seek_feasible(faces, targets, contacts, model, most, rotation, translation):
-    """Lower the largest ``g`` from a starting pose; returns whether all bounds are met.
+def seek_feasible(
+    count, faces, targets, contacts, model, most, prove, ball, angle, rotation, translation, work
+):
+    """Lower the largest ``g`` from a starting pose to a witness, or to a proof that there is none.
 
-    A descent on a problem that rotations make non-convex: not finding a pose proves nothing.
+    The barrier's multipliers, ``1 / (s - g)``, are weights of a proof, see `proof_kernels`.
 
     Args:
-        faces: (n,) the face of each contact.
-        targets: (n,) the polygon that stands for that face.
-        contacts: positions, normals, position bounds, bounds on chords; world frame.
-        model: see `pose_kernels.test_interpretations`.
+        count: how many contacts count.
+        faces: (n,) the feature of each contact, -1 for none.
+        targets: (n,) the polygon that stands for that feature.
+        contacts: see `search_kernels.search_model`.
+        model: likewise.
         most: the most Newton steps.
+        prove: whether to try for a proof, and to stay in the ball.
+        ball: (3, 3) a rotation that none within the bounds is farther from than ...
+        angle: ... this angle, radians.
         rotation: (3, 3) object to world, moved in place.
         translation: (3,) likewise, metres.
+        work: see `proof_kernels.workspace`.
+
+    Returns:
+        FEASIBLE, REJECTED or UNDECIDED (which proves nothing).
     """
-    points, measured, reaches, chords = contacts
+    points, measured = contacts[0], contacts[1]
     centre, radius = model[5], model[6]
-    count = len(points)
-    x = np.empty((count, 3))
-    u = np.empty((count, 3))
+    readings, rows = work[0], work[3]
+    x, u, weights = rows[0], rows[1], rows[3]
     system = np.empty((7, 7))
     gradient = np.empty(7)
     factor = np.zeros((7, 7))
     step = np.empty(7)
     part = np.empty(7)
+    turn = np.empty(3)
     trial_rotation = np.empty((3, 3))
     trial_translation = np.empty(3)
-    to_object(points, measured, rotation, translation, x, u)
-    worst, _ = worst_excess(x, u, faces, targets, reaches, chords, model, False)
+    carry(count, points, measured, rotation, translation, x, u)
+    worst = read(count, faces, targets, x, u, model, contacts, readings) ** 2 - 1.0
     if worst <= EXACT:
-        return True
-    readings = 2.0 * count
+        return FEASIBLE
+    amount = 2.0 * count
     level = worst + 0.5 * (1.0 + worst)
-    sharpness = readings / (1.0 + worst)
-    value = assemble_barrier(
-        level, x, u, x - centre, u, faces, targets, reaches, chords, model, system, gradient
+    sharpness = amount / (1.0 + worst)
+    value = _assemble_barrier(
+        level, count, faces, x, u, model, contacts, readings, system, gradient
     )
+    if prove:
+        # The start may be a little outside.
+        angle = max(angle, turn_between(ball, rotation, turn))
+        value += _add_ball(level, turn, angle, radius, system, gradient)
     for _ in range(most):
         gradient[6] += sharpness
         solve(system, gradient, 1e-3 / (radius * radius), factor, step)
@@ -211,11 +214,28 @@ def seek_feasible(faces, targets, contacts, model, most, rotation, translation):
         for a in range(6):
             length += step[a] * step[a]
         gradient[6] -= sharpness
-        # At the centre for this sharpness the optimum is about readings / sharpness below.
+        # At the centre for this sharpness the optimum is about amount / sharpness below.
         if decrement < 0.5:
-            gap = 2.0 * readings / sharpness
+            gap = 2.0 * amount / sharpness
+            if prove and gap < level:
+                # The readings are those of the last trial, which was accepted: this pose.
+                for i in range(count):
+                    if faces[i] < 0:
+                        continue
+                    share = readings[1][i] / contacts[2][i]
+                    weights[i, 0] = 1.0 / (level - share * share + 1.0)
+                    weights[i, 1] = 0.0
+                    if readings[4][i] != NO_CONE:
+                        bound = contacts[4][i] if readings[4][i] == ARC else contacts[3][i]
+                        share = readings[5][i] / bound
+                        weights[i, 1] = 1.0 / (level - share * share + 1.0)
+                proved, _ = disprove(
+                    count, faces, targets, model, contacts, rotation, ball, angle, False, work
+                )
+                if proved:
+                    return REJECTED
             if gap < 0.02 * level or gap < 0.1 * EXACT:
-                return False
+                return UNDECIDED
             sharpness *= 10.0
             continue
         share = min(1.0, 0.3 * radius / np.sqrt(max(length, 1e-300)))
@@ -225,34 +245,24 @@ def seek_feasible(faces, targets, contacts, model, most, rotation, translation):
             for a in range(7):
                 part[a] = share * step[a]
             move(rotation, translation, part, centre, radius, trial_rotation, trial_translation)
-            to_object(points, measured, trial_rotation, trial_translation, x, u)
-            trial = assemble_barrier(
-                level + part[6],
-                x,
-                u,
-                x - centre,
-                u,
-                faces,
-                targets,
-                reaches,
-                chords,
-                model,
-                system,
-                gradient,
+            carry(count, points, measured, trial_rotation, trial_translation, x, u)
+            worst = read(count, faces, targets, x, u, model, contacts, readings) ** 2 - 1.0
+            trial = _assemble_barrier(
+                level + part[6], count, faces, x, u, model, contacts, readings, system, gradient
             )
+            if prove and trial < np.inf:
+                turn_between(ball, trial_rotation, turn)
+                trial += _add_ball(level + part[6], turn, angle, radius, system, gradient)
             if trial - value + sharpness * part[6] <= -0.01 * share * decrement:
                 moved = True
                 break
             share *= 0.5
         if not moved:
-            return False
+            return UNDECIDED
         level += part[6]
         value = trial
         rotation[:] = trial_rotation
         translation[:] = trial_translation
-        if level <= EXACT:
-            return True
-        worst, _ = worst_excess(x, u, faces, targets, reaches, chords, model, False)
-        if worst <= EXACT:
-            return True
-    return False
+        if level <= EXACT or worst <= EXACT:
+            return FEASIBLE
+    return UNDECIDED

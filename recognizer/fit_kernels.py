@@ -5,94 +5,116 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from .motion_kernels import add_row, cross, move, slope_row, solve, to_object
-from .polygon_kernels import INSIDE, nearest_in_polygon
+from .motion_kernels import add_row, move, slope_row, solve
+from .polygon_kernels import CORNER, INSIDE
+from .reading_kernels import ARC, NO_CONE, carry, read
 
 
 @njit(cache=True)
-def assemble_fit(bounded, x, u, faces, contacts, model, system, gradient):
+def assemble_fit(bounded, count, faces, x, u, model, contacts, readings, system, gradient):
     """Normal equations of the least-squares misfit at one pose; returns the misfit.
 
     Each contact counts its height above the plane of its face, how far beyond its bound it lies
-    outside the face's hull, and the difference of its normal, each by its variance.
+    outside the face's hull, and the difference of its normal, each by its variance. On an edge or
+    a vertex every distance counts.
 
     Args:
         bounded: whether lying outside a face counts. It holds a fit to the faces, but only from
             one side, so it isn't information about the pose.
+        count: how many contacts count.
+        faces: (n,) the feature of each contact, -1 for none.
         x: (n, 3) contacts, object frame.
         u: (n, 3) measured normals, object frame.
-        faces: (n,) the face of each contact.
-        contacts: positions, normals, position bounds, normal bounds; world frame.
-        model: see `pose_kernels.test_interpretations`.
+        model: see `search_kernels.search_model`.
+        contacts: likewise.
+        readings: see `reading_kernels.read`, which must have run.
         system: (6, 6) lower triangle written in place.
         gradient: (6,) written in place.
     """
-    _, _, position_error, normal_error = contacts
-    normals, offsets, _, start, corners, centre, radius = model
+    normals, start, centre, radius = model[0], model[3], model[5], model[6]
+    _, _, reaches, chords, sines = contacts
+    gaps, lengths, heights, regions, kinds, misses, directions = readings
     row = np.empty(6)
     arm = np.empty(3)
     turn = np.empty(3)
-    nearest = np.empty(3)
     direction = np.empty(3)
     system[:] = 0.0
     gradient[:] = 0.0
     cost = 0.0
-    for i in range(len(x)):
+    for i in range(count):
         f = faces[i]
+        if f < 0:
+            continue
         m = normals[f]
-        squared, height, region = nearest_in_polygon(
-            x[i], m, offsets[f], corners, start[f], start[f + 1], nearest
-        )
-        bound = position_error[i]
+        bound = reaches[i]
         # A point uniform in a ball has variance bound^2 / 5 along any axis.
         weight = 5.0 / (bound * bound)
         for k in range(3):
             arm[k] = x[i, k] - centre[k]
-        slope_row(m, arm, radius, turn, row)
-        add_row(row, height, weight, system, gradient)
-        cost += weight * height * height
-        if bounded and region != INSIDE:
-            outside = np.sqrt(squared - height * height)
-            if outside > bound:
-                for k in range(3):
-                    direction[k] = (x[i, k] - height * m[k] - nearest[k]) / outside
+        height = heights[i]
+        solid = start[f + 1] - start[f] > 2
+        if solid or regions[i] != CORNER:
+            slope_row(m, arm, radius, turn, row)
+            add_row(row, height, weight, system, gradient)
+            cost += weight * height * height
+        if not solid and regions[i] == CORNER:
+            cost += weight * lengths[i] * lengths[i]
+            for k in range(3):
+                direction[:] = 0.0
+                direction[k] = 1.0
                 slope_row(direction, arm, radius, turn, row)
-                excess = outside - bound
+                add_row(row, gaps[i, k], weight, system, gradient)
+        elif regions[i] != INSIDE and (bounded or not solid):
+            squared = lengths[i] * lengths[i] - height * height
+            outside = np.sqrt(max(squared, 0.0))
+            excess = outside - bound if solid else outside
+            if outside > 0.0 and excess > 0.0:
+                for k in range(3):
+                    direction[k] = (gaps[i, k] - height * m[k]) / outside
+                slope_row(direction, arm, radius, turn, row)
                 add_row(row, excess, weight, system, gradient)
                 cost += weight * excess * excess
-        bound = normal_error[i]
-        if bound >= np.pi:
+        if kinds[i] == NO_CONE:
             continue
+        bound = sines[i] if kinds[i] == ARC else chords[i]
         # A direction uniform in a narrow cone has variance bound^2 / 4 about either axis.
         weight = 4.0 / (bound * bound)
-        cross(u[i], m, turn)
+        miss = misses[i]
+        cost += weight * miss * miss
+        e0, e1, e2 = directions[i, 0], directions[i, 1], directions[i, 2]
+        u0, u1, u2 = u[i, 0], u[i, 1], u[i, 2]
+        turn[0], turn[1], turn[2] = e1 * u2 - e2 * u1, e2 * u0 - e0 * u2, e0 * u1 - e1 * u0
         for a in range(3):
-            gradient[a] += weight * turn[a] / radius
-            cost += weight * (u[i, a] - m[a]) ** 2
-            system[a, a] += weight / (radius * radius)
+            gradient[a] += weight * miss * turn[a] / radius
             for b in range(a + 1):
-                system[a, b] -= weight * u[i, a] * u[i, b] / (radius * radius)
+                if kinds[i] == ARC:
+                    system[a, b] += weight * turn[a] * turn[b] / (radius * radius)
+                else:
+                    system[a, b] -= weight * u[i, a] * u[i, b] / (radius * radius)
+            if kinds[i] != ARC:
+                system[a, a] += weight / (radius * radius)
     return cost
 
 
 @njit(cache=True)
-def fit_pose(faces, contacts, model, most, rotation, translation):
+def fit_pose(count, faces, contacts, model, most, rotation, translation, readings):
     """Damped Gauss-Newton from a starting pose, in place; returns the misfit.
 
     The damping holds the pose still along a freedom that no contact bears on, so that it does not
     drift there.
 
     Args:
-        faces: (n,) the face of each contact.
-        contacts: positions, normals, position bounds, normal bounds; world frame.
-        model: see `pose_kernels.test_interpretations`.
+        count: how many contacts count.
+        faces: (n,) the feature of each contact, -1 for none.
+        contacts: see `search_kernels.search_model`.
+        model: likewise.
         most: the most steps.
         rotation: (3, 3) object to world.
         translation: (3,) object to world, metres.
+        readings: see `reading_kernels.read`; work space.
     """
-    points, normals, position_error, _ = contacts
+    points, normals, reaches = contacts[0], contacts[1], contacts[2]
     centre, radius = model[5], model[6]
-    count = len(points)
     x = np.empty((count, 3))
     u = np.empty((count, 3))
     system = np.empty((6, 6))
@@ -103,9 +125,10 @@ def fit_pose(faces, contacts, model, most, rotation, translation):
     step = np.empty(6)
     trial_rotation = np.empty((3, 3))
     trial_translation = np.empty(3)
-    finest = 1e-3 * position_error.min()
-    to_object(points, normals, rotation, translation, x, u)
-    cost = assemble_fit(True, x, u, faces, contacts, model, system, gradient)
+    finest = 1e-3 * reaches.min()
+    carry(count, points, normals, rotation, translation, x, u)
+    read(count, faces, faces, x, u, model, contacts, readings)
+    cost = assemble_fit(True, count, faces, x, u, model, contacts, readings, system, gradient)
     # As if half a diameter were known of every freedom: nothing beside any real bound.
     least = 1.0 / (radius * radius)
     damping = least
@@ -122,8 +145,11 @@ def fit_pose(faces, contacts, model, most, rotation, translation):
             for a in range(6):
                 step[a] *= 0.5 * radius / length
         move(rotation, translation, step, centre, radius, trial_rotation, trial_translation)
-        to_object(points, normals, trial_rotation, trial_translation, x, u)
-        trial = assemble_fit(True, x, u, faces, contacts, model, trial_system, trial_gradient)
+        carry(count, points, normals, trial_rotation, trial_translation, x, u)
+        read(count, faces, faces, x, u, model, contacts, readings)
+        trial = assemble_fit(
+            True, count, faces, x, u, model, contacts, readings, trial_system, trial_gradient
+        )
         if trial <= cost:
             gain = cost - trial
             rotation[:] = trial_rotation

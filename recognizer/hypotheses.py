@@ -8,10 +8,11 @@ their centroids, up to the object's own symmetries.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import RigidTransform, Rotation
+from scipy.spatial.transform import RigidTransform
 
 from .hypothesis_kernels import group_poses
 from .polyhedron import Polyhedron
@@ -46,9 +47,8 @@ class Hypothesis:
     """An object at a pose, as some interpretations of the contacts have it."""
 
     object_name: str
-    pose: RigidTransform
-    """Model to world, ``T_world_object``; the best fit among its interpretations. Of poses that
-    differ by a symmetry of the object only one is reported."""
+    T_world_object: Floats
+    """(4, 4) `pose` as a matrix."""
     weight: float
     """Share of the belief, between 0 and 1."""
     interpretations: NDArray[np.int32]
@@ -57,6 +57,18 @@ class Hypothesis:
     """(d, 6) motions that the contacts leave open beyond the pose tolerance, d = 0 if none:
     orthonormal rows of rotation about the centroid (times half the diameter) and shift, in the
     object's frame. Along them ``pose`` is one example of many."""
+    covariance: Floats
+    """(6, 6) of the pose, in the same motions, square metres: a local approximation by the least
+    squares of its best interpretation, with half a turn and half a diameter known beforehand."""
+
+    @cached_property
+    def pose(self) -> RigidTransform:
+        """Model to world; the best fit among its interpretations.
+
+        It is within every bound. Of poses that differ by a symmetry of the object only one is
+        reported.
+        """
+        return RigidTransform.from_matrix(self.T_world_object)
 
     @property
     def determined(self) -> bool:
@@ -92,7 +104,8 @@ def cluster(
     groups = group_poses(poses.rotations, centres, model.symmetries, tolerance.rotation, most_shift)
     leaders = np.unique(groups, return_index=True)[1]
     prior = np.diag([1.0 / (np.pi * radius)] * 3 + [1.0 / radius] * 3) ** 2
-    variances, motions = np.linalg.eigh(np.linalg.inv(poses.informations + prior))
+    covariances = np.linalg.inv(poses.informations + prior)
+    variances, motions = np.linalg.eigh(covariances)
     log_volumes = 0.5 * np.log(variances).sum(axis=1) + np.log(len(model.symmetries))
     # Three standard deviations of each motion, against what the tolerance allows it: with bounded
     # noise hardly any fit is off by more.
@@ -104,13 +117,19 @@ def cluster(
         hypotheses.append(
             Hypothesis(
                 object_name=model.name,
-                pose=RigidTransform.from_components(
-                    poses.translations[leader], Rotation.from_matrix(poses.rotations[leader])
-                ),
+                T_world_object=_matrix(poses.rotations[leader], poses.translations[leader]),
                 weight=1.0,
                 interpretations=poses.faces[members],
                 freedoms=motions[leader].T[open_motions],
+                covariance=covariances[leader],
             )
         )
         log_weights[group] = log_volumes[members].max()
     return hypotheses, log_weights
+
+
+def _matrix(rotation: Floats, translation: Floats) -> Floats:
+    matrix = np.eye(4)
+    matrix[:3, :3] = rotation
+    matrix[:3, 3] = translation
+    return matrix

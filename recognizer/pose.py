@@ -19,9 +19,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from . import branch_kernels, pose_kernels
+from . import family_kernels, pose_kernels
 from .contacts import Contacts
+from .features import Features, face_features
 from .polyhedron import Polyhedron
+from .verdict_kernels import FEASIBLE, REJECTED
 
 Floats = NDArray[np.float64]
 
@@ -59,61 +61,75 @@ class Poses:
         )
 
 
+KernelContacts = tuple[Floats, Floats, Floats, Floats, Floats]
+
+
+def kernel_contacts(contacts: Contacts) -> KernelContacts:
+    """Contacts as the kernels read them: see `search_kernels.search_model`."""
+    errors = contacts.normal_error
+    return (
+        contacts.positions,
+        contacts.normals,
+        contacts.position_error,
+        2.0 * np.sin(0.5 * errors),
+        np.sin(np.minimum(errors, np.pi / 2.0)),
+    )
+
+
 class ModelTest:
     """The model test for one model; holds the model as the kernels read it."""
 
-    def __init__(self, model: Polyhedron, *, boxes: int = 256, pool: int = 20_000) -> None:
+    def __init__(
+        self,
+        model: Polyhedron,
+        features: Features | None = None,
+        *,
+        boxes: int = 5_000,
+        pool: int = 500_000,
+    ) -> None:
         """Prepare a model.
 
         Args:
             model: the object.
+            features: what of it contacts may lie on; its faces by default.
             boxes: boxes of rotations to look at before an interpretation is left undecided.
             pool: the same for all interpretations of one call together; a thousand take about
-                a tenth of a second.
+                ten milliseconds.
         """
-        self._boxes, self._pool = boxes, pool
-        hulls, pieces = model.hulls, model.pieces
+        self.boxes, self.pool = boxes, pool
+        self.features = features = features or face_features(model)
         self.radius = model.diameter / 2.0
-        self._model = (
-            model.normals,
-            model.offsets,
-            pieces.first + model.face_count,
-            np.concatenate([hulls.start[:-1], pieces.start + len(hulls.corners)]),
-            np.concatenate([hulls.corners, pieces.corners]),
+        self.model = (
+            features.normals,
+            features.offsets,
+            features.first,
+            features.start,
+            features.corners,
             model.centroid,
             self.radius,
+            features.cone_start,
+            features.cone_normals,
         )
-        counts = np.diff(hulls.start)
-        self._middles = np.add.reduceat(hulls.corners, hulls.start[:-1], axis=0) / counts[:, None]
+        self.middles = np.ascontiguousarray(features.middles)
 
     def run(self, interpretations: NDArray[np.int32], contacts: Contacts) -> Poses:
         """Drop the interpretations that no pose satisfies; give each of the rest a pose.
 
         Args:
-            interpretations: (m, n) a face for each contact.
+            interpretations: (m, n) a feature for each contact, -1 for none.
             contacts: the n contacts.
         """
-        verdicts, *rest = self._verdicts(interpretations, contacts, pass_vague=False)
-        rotations, translations, costs, informations = rest
-        poses = Poses(
-            interpretations,
-            rotations,
-            translations,
-            costs,
-            informations,
-            verdicts == branch_kernels.FEASIBLE,
+        verdicts, *rest = pose_kernels.test_interpretations(
+            np.ascontiguousarray(interpretations, np.int32),
+            kernel_contacts(contacts),
+            self.model,
+            self.features.half_angles,
+            self.middles,
+            self.boxes,
+            self.pool,
         )
-        return poses.take(verdicts != branch_kernels.REJECTED)
-
-    def prune(self, interpretations: NDArray[np.int32], contacts: Contacts) -> NDArray[np.int32]:
-        """Drop partial interpretations that no pose satisfies, where that is quickly shown.
-
-        Args:
-            interpretations: (m, k) a face for each of the first k contacts.
-            contacts: those k contacts.
-        """
-        verdicts = self._verdicts(interpretations, contacts, pass_vague=True)[0]
-        return interpretations[verdicts != branch_kernels.REJECTED]
+        poses = Poses(interpretations, *rest, verdicts == FEASIBLE)
+        return poses.take(verdicts != REJECTED)
 
     def span(
         self,
@@ -127,7 +143,7 @@ class ModelTest:
         """Poses that an interpretation allows, a step apart along the motions it leaves open.
 
         Args:
-            faces: (n,) a face for each contact.
+            faces: (n,) a feature for each contact, -1 for none.
             contacts: the n contacts.
             pose: where to start.
             motions: (d, 6) unit small motions: rotation about the centroid times the radius, shift.
@@ -138,13 +154,10 @@ class ModelTest:
             A stack of poses, the first of them ``pose``.
         """
         rotations, translations = np.empty((most, 3, 3)), np.empty((most, 3))
-        found = pose_kernels.span_family(
+        found = family_kernels.span_family(
             faces.astype(np.int64),
-            contacts.positions,
-            contacts.normals,
-            contacts.position_error,
-            contacts.normal_error,
-            self._model,
+            kernel_contacts(contacts),
+            self.model,
             pose.rotation.as_matrix(),
             np.array(pose.translation),
             np.ascontiguousarray(motions),
@@ -154,20 +167,4 @@ class ModelTest:
         )
         return RigidTransform.from_components(
             translations[:found], Rotation.from_matrix(rotations[:found])
-        )
-
-    def _verdicts(
-        self, interpretations: NDArray[np.int32], contacts: Contacts, *, pass_vague: bool
-    ) -> tuple[NDArray[np.int8], Floats, Floats, Floats, Floats]:
-        return pose_kernels.test_interpretations(
-            interpretations,
-            contacts.positions,
-            contacts.normals,
-            contacts.position_error,
-            contacts.normal_error,
-            self._model,
-            self._middles,
-            self._boxes,
-            self._pool,
-            pass_vague,
         )

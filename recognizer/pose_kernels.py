@@ -1,243 +1,145 @@
-"""Compiled model test: from interpretations to poses and verdicts."""
+"""Compiled model test: from an interpretation to a pose within all bounds, or a proof of none."""
 
 from __future__ import annotations
 
 import numpy as np
 from numba import njit
 
-from .branch_kernels import (
-    FEASIBLE,
-    REJECTED,
-    UNDECIDED,
-    align,
-    middle_translation,
-    rotation_at,
-    search_poses,
-)
-from .feasibility_kernels import EXACT, seek_feasible, worst_excess
+from .align_kernels import align, middle_translation
 from .fit_kernels import assemble_fit, fit_pose
-from .motion_kernels import move, to_object
+from .proof_kernels import locate, workspace
+from .reading_kernels import carry, read, worst_on_pieces
+from .search_pose_kernels import box_stack, search_poses
+from .verdict_kernels import BESIDE, EXACT, FEASIBLE, REJECTED, judge
 
-MOST_FIT_STEPS = 20
-ROUNDING = 1e-6
-"""Misfit of normals, in squared bounds, that is put down to rounding."""
-VAGUE = 0.6
-"""Spread (radians) of a rotation from which the normals don't fix it."""
-
-
-@njit(cache=True)
-def _meets(faces, contacts, model, rotation, translation, x, u):
-    points, measured, reaches, chords = contacts
-    to_object(points, measured, rotation, translation, x, u)
-    worst, _ = worst_excess(x, u, faces, faces, reaches, chords, model, True)
-    return worst
+LEAF_STEPS = 6
+"""Steps of the first verdict; what it leaves open is cut into boxes."""
+FIT_STEPS = 20
 
 
 @njit(cache=True)
-def test_interpretations(
-    interpretations,
-    points,
-    measured,
-    position_error,
-    normal_error,
-    model,
-    middles,
-    most_boxes,
-    pool,
-    pass_vague,
-):
-    """Fit a pose to each interpretation and test whether its bounds can be met.
+def finish(count, faces, contacts, model, rotation, translation, work, information):
+    """The best fit near a witness, if that is a witness too; misfit and information of the pose."""
+    points, measured = contacts[0], contacts[1]
+    readings, rows, systems, vectors, frames = work[0], work[3], work[4], work[5], work[6]
+    x, u = rows[0], rows[1]
+    system, gradient = systems[0], vectors[0]
+    fitted, shifted = frames[0], vectors[3]
+    fitted[:] = rotation
+    shifted[:] = translation
+    fit_pose(count, faces, contacts, model, FIT_STEPS, fitted, shifted, readings)
+    carry(count, points, measured, fitted, shifted, x, u)
+    worst = read(count, faces, faces, x, u, model, contacts, readings)
+    if worst <= 1.0 + EXACT:
+        worst, _ = worst_on_pieces(count, faces, faces, x, model, contacts, readings)
+    if worst <= 1.0 + EXACT:
+        rotation[:] = fitted
+        translation[:] = shifted
+    else:
+        carry(count, points, measured, rotation, translation, x, u)
+        read(count, faces, faces, x, u, model, contacts, readings)
+    cost = assemble_fit(True, count, faces, x, u, model, contacts, readings, system, gradient)
+    assemble_fit(False, count, faces, x, u, model, contacts, readings, system, gradient)
+    for a in range(6):
+        for b in range(6):
+            information[a, b] = system[max(a, b), min(a, b)]
+    return cost
+
+
+@njit(cache=True)
+def start_pose(count, faces, contacts, model, half_angles, middles, rotation, translation):
+    """The pose that the normals ask for; returns the same angle as `align_kernels.align`."""
+    angle = align(count, faces, model, half_angles, contacts, rotation)
+    middle_translation(count, faces, contacts[0], middles, rotation, translation)
+    return angle
+
+
+@njit(cache=True)
+def settle(count, faces, contacts, model, angle, most, rotation, translation, work, stack):
+    """Judge an interpretation as far as a budget of boxes allows.
 
     Args:
-        interpretations: (m, n) a face for each contact.
-        points: (n, 3) positions, world frame, metres.
-        measured: (n, 3) normals, world frame.
-        position_error: (n,) bounds, metres.
-        normal_error: (n,) bounds, radians.
-        model: face normals (f, 3); plane offsets (f,); (f + 1,) the first convex piece of each
-            face; (p + 1,) the first corner of each polygon, of which the first f are the faces'
-            hulls and the rest their pieces; corners (c, 3); centroid (3,); radius. Object frame.
-        middles: (f, 3) a point inside each face's hull.
+        count: how many contacts count.
+        faces: (n,) the feature of each contact, -1 for none.
+        contacts: see `search_kernels.search_model`.
+        model: likewise.
+        angle: an angle from the starting rotation that no rotation within the bounds exceeds.
+        most: the most boxes to look at.
+        rotation: (3, 3) object to world, moved in place.
+        translation: (3,) likewise.
+        work: see `verdict_kernels.workspace`.
+        stack: see `search_pose_kernels.box_stack`.
+
+    Returns:
+        REJECTED, FEASIBLE or UNDECIDED, and how many boxes were looked at.
+    """
+    ball = work[6][1]
+    ball[:] = rotation
+    verdict, angle, _, _ = judge(
+        count, faces, faces, contacts, model, ball, angle, LEAF_STEPS, rotation, translation, work
+    )
+    if verdict == REJECTED or verdict == FEASIBLE:
+        return verdict, 0
+    if verdict == BESIDE:
+        locate(count, faces, faces, model, contacts, rotation, ball, angle, work)
+    return search_poses(
+        count, faces, contacts, model, angle, most, rotation, translation, work, stack
+    )
+
+
+@njit(cache=True)
+def test_interpretations(interpretations, contacts, model, half_angles, middles, most_boxes, pool):
+    """Judge interpretations one by one.
+
+    Args:
+        interpretations: (m, n) a feature for each contact, -1 for none.
+        contacts: see `search_kernels.search_model`.
+        model: likewise.
+        half_angles: likewise.
+        middles: likewise.
         most_boxes: the most boxes of rotations to look at, an interpretation.
-        pool: the most boxes in all; once it is empty, what no fit settles stays undecided.
-        pass_vague: leave interpretations whose normals don't fix the rotation undecided at once.
-            They are what the search is slowest on, and more contacts soon settle them.
+        pool: the same for all together; once it is empty, what no fit settles stays undecided.
 
     Returns:
         (m,) verdicts, (m, 3, 3) rotations, (m, 3) translations, (m,) least-squares misfits, and
         (m, 6, 6) information about small motions (see `motion_kernels`).
     """
-    size = len(interpretations)
-    count = len(points)
-    contacts = (points, measured, position_error, normal_error)
-    bounds = (points, measured, position_error, 2.0 * np.sin(0.5 * normal_error))
+    size, count = interpretations.shape
     verdicts = np.empty(size, np.int8)
     rotations = np.zeros((size, 3, 3))
     translations = np.zeros((size, 3))
     costs = np.zeros(size)
     informations = np.zeros((size, 6, 6))
-    values = np.empty(4)
-    vectors = np.empty((4, 4))
-    best = np.zeros(3)
-    rotation = np.empty((3, 3))
-    translation = np.empty(3)
-    fitted = np.empty((3, 3))
-    shifted = np.empty(3)
-    system = np.empty((6, 6))
-    gradient = np.empty(6)
-    x = np.empty((count, 3))
-    u = np.empty((count, 3))
+    work = workspace(count)
+    stack = box_stack(count)
     faces = np.empty(count, np.int64)
+    rotation, translation = np.empty((3, 3)), np.empty(3)
     for m in range(size):
         faces[:] = interpretations[m]
         verdicts[m] = REJECTED
-        slack, spread = align(faces, bounds, model, values, vectors)
-        if slack < -ROUNDING:
+        angle = start_pose(
+            count, faces, contacts, model, half_angles, middles, rotation, translation
+        )
+        if angle < 0.0:
             continue
-        if pass_vague and spread > VAGUE:
-            verdicts[m] = UNDECIDED
+        verdicts[m], looked = settle(
+            count,
+            faces,
+            contacts,
+            model,
+            angle,
+            min(most_boxes, pool),
+            rotation,
+            translation,
+            work,
+            stack,
+        )
+        pool -= looked
+        if verdicts[m] == REJECTED:
             continue
-        # Never zero: the search divides by the size of the set of rotations this leaves.
-        slack = max(slack, 0.0) + ROUNDING
-        rotation_at(best, vectors, rotation)
-        middle_translation(faces, points, middles, rotation, translation)
-        fit_pose(faces, contacts, model, MOST_FIT_STEPS, rotation, translation)
-        worst = _meets(faces, bounds, model, rotation, translation, x, u)
-        if worst > EXACT and seek_feasible(faces, faces, bounds, model, 60, rotation, translation):
-            worst = _meets(faces, bounds, model, rotation, translation, x, u)
-        if worst <= EXACT:
-            verdicts[m] = FEASIBLE
-        else:
-            verdicts[m], looked = search_poses(
-                slack,
-                values,
-                vectors,
-                faces,
-                bounds,
-                model,
-                middles,
-                min(most_boxes, pool),
-                rotation,
-                translation,
-            )
-            pool -= looked
-            if verdicts[m] == REJECTED:
-                continue
-            # A better pose than just any witness: the fit nearest to it, if that is one too.
-            fitted[:] = rotation
-            shifted[:] = translation
-            fit_pose(faces, contacts, model, MOST_FIT_STEPS, fitted, shifted)
-            if verdicts[m] == UNDECIDED or (
-                _meets(faces, bounds, model, fitted, shifted, x, u) <= EXACT
-            ):
-                rotation[:] = fitted
-                translation[:] = shifted
-        to_object(points, measured, rotation, translation, x, u)
-        costs[m] = assemble_fit(True, x, u, faces, contacts, model, system, gradient)
-        assemble_fit(False, x, u, faces, contacts, model, system, gradient)
+        costs[m] = finish(
+            count, faces, contacts, model, rotation, translation, work, informations[m]
+        )
         rotations[m] = rotation
         translations[m] = translation
-        for a in range(6):
-            for b in range(6):
-                informations[m, a, b] = system[max(a, b), min(a, b)]
     return verdicts, rotations, translations, costs, informations
-
-
-@njit(cache=True)
-def _moved(rotation, translation, new_rotation, new_translation, model):
-    """How far a motion took the object: shift of its centroid and turn times its radius, metres."""
-    centre, radius = model[5], model[6]
-    shift = 0.0
-    turn = 0.0
-    for i in range(3):
-        step = new_translation[i] - translation[i]
-        for k in range(3):
-            step += (new_rotation[i, k] - rotation[i, k]) * centre[k]
-            turn += (new_rotation[i, k] - rotation[i, k]) ** 2
-        shift += step * step
-    # The Frobenius norm of the difference of two rotations is about sqrt(2) times the angle.
-    return np.sqrt(shift + 0.5 * turn * radius * radius)
-
-
-@njit(cache=True)
-def span_family(
-    faces,
-    points,
-    measured,
-    position_error,
-    normal_error,
-    model,
-    rotation,
-    translation,
-    motions,
-    step,
-    rotations,
-    translations,
-):
-    """Poses that meet all bounds, a step apart along given motions, spreading from a first one.
-
-    Args:
-        faces: (n,) the face of each contact.
-        points: (n, 3) positions, world frame, metres.
-        measured: (n, 3) normals, world frame.
-        position_error: (n,) bounds, metres.
-        normal_error: (n,) bounds, radians.
-        model: see `test_interpretations`.
-        rotation: (3, 3) the first pose.
-        translation: (3,) likewise.
-        motions: (d, 6) unit small motions (see `motion_kernels`).
-        step: length of a step, metres.
-        rotations: (k, 3, 3) written in place; k is the most poses.
-        translations: (k, 3) likewise.
-
-    Returns:
-        How many poses were written.
-    """
-    count, most, ways = len(points), len(rotations), len(motions)
-    bounds = (points, measured, position_error, 2.0 * np.sin(0.5 * normal_error))
-    places = np.zeros((most, ways), np.int64)
-    new_place = np.empty(ways, np.int64)
-    along = np.empty(6)
-    turned = np.empty((3, 3))
-    shifted = np.empty(3)
-    x = np.empty((count, 3))
-    u = np.empty((count, 3))
-    rotations[0] = rotation
-    translations[0] = translation
-    found = 1
-    at = 0
-    while at < found and found < most:
-        # Diagonals too: a narrow family may run between the axes.
-        for way in range(3**ways):
-            along[:] = 0.0
-            rest = way
-            for k in range(ways):
-                new_place[k] = places[at, k] + rest % 3 - 1
-                along += step * (rest % 3 - 1) * motions[k]
-                rest //= 3
-            known = False
-            for k in range(found):
-                known |= np.all(places[k] == new_place)
-            if known or found == most:
-                continue
-            move(
-                rotations[at],
-                translations[at],
-                along,
-                model[5],
-                model[6],
-                turned,
-                shifted,
-            )
-            # A curved family leaves its tangent: a nudge brings the pose back into the bounds.
-            seek_feasible(faces, faces, bounds, model, 20, turned, shifted)
-            # At the family's end it brings it back to where it came from: no new pose.
-            moved = _moved(rotations[at], translations[at], turned, shifted, model)
-            meets = _meets(faces, bounds, model, turned, shifted, x, u) <= EXACT
-            if meets and moved > 0.5 * step:
-                places[found] = new_place
-                rotations[found] = turned
-                translations[found] = shifted
-                found += 1
-        at += 1
-    return found

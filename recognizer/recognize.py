@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from time import perf_counter
+from pathlib import Path
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,11 +13,18 @@ from scipy.spatial.transform import RigidTransform
 
 from .belief import Belief, Search
 from .contacts import Contacts
-from .hypotheses import Hypothesis, PoseTolerance, cluster
+from .features import Features
+from .hypotheses import Hypothesis, PoseTolerance
+from .planar_ranges import PlanarTables
+from .planar_recognize import PlanarEntry, search_polygon, span_polygon
+from .polygon import Polygon
 from .polyhedron import Polyhedron
-from .pose import ModelTest
 from .ranges import PairTables
-from .tree import Constraints, InterpretationTree, root, spread_order
+from .solid_recognize import SolidEntry, search_solid, span_solid
+from .tree import Constraints, spread_order
+from .tree_kernels import least_span
+
+Found = tuple[list[Hypothesis], NDArray[np.float64], Search]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,28 +32,22 @@ class SearchLimits:
     """How the tree is grown, and when it is cut short."""
 
     budget: int = 100_000
-    """The most interpretations of one model held at a time; more, and the belief says that it is
-    not complete."""
+    """The most interpretations of one model; more, and the belief says that it is not complete."""
+    nodes: int = 20_000_000
+    """The most branches of one model's tree; likewise."""
+    crowd: int = 16
+    """Completions of a branch from which the pose is asked for within the tree."""
     first_stage: int = 4
-    """Levels grown before the first model test."""
+    """In the plane: levels grown before the first model test."""
     stage: int = 4
-    """Levels grown between two model tests after it, while interpretations are few."""
-    crowd: int = 64
-    """Interpretations from which the model test is worth its time within the tree."""
+    """In the plane: levels grown between two model tests, while interpretations are few."""
     flood: int = 2000
-    """Interpretations at which a stage is broken off and grown a level at a time instead."""
+    """In the plane: interpretations at which a stage is grown a level at a time instead."""
 
     def __post_init__(self) -> None:
-        for name in ("budget", "first_stage", "stage", "crowd", "flood"):
+        for name in ("budget", "nodes", "crowd", "first_stage", "stage", "flood"):
             if getattr(self, name) < 1:
                 raise ValueError(f"{name} is {getattr(self, name)}; it must be at least 1")
-
-
-@dataclass(frozen=True, eq=False)
-class _Entry:
-    model: Polyhedron
-    tables: PairTables
-    test: ModelTest
 
 
 class Recognizer:
@@ -56,44 +58,75 @@ class Recognizer:
 
     def __init__(
         self,
-        models: Iterable[Polyhedron],
+        models: Iterable[Polyhedron] | Iterable[Polygon],
         *,
+        features: Literal["faces", "all"] = "faces",
         constraints: Constraints | None = None,
         tolerance: PoseTolerance | None = None,
         limits: SearchLimits | None = None,
+        cache: Path | None = None,
     ) -> None:
         """Prepare a library.
 
         Args:
-            models: the library; names must differ.
-            constraints: which constraints prune the tree.
+            models: the library, solids or outlines; names must differ.
+            features: what of a solid a contact may lie on: its faces, or "all" for its convex edges
+                and vertices too, which a finger with a ball tip meets.
+            constraints: which constraints prune the tree; those on triples are for `tree.prune`.
             tolerance: which poses count as the same.
             limits: how far the search goes.
+            cache: a folder to keep range tables in between runs, by content.
 
         Raises:
-            ValueError: no model at all, or two of the same name.
+            ValueError: no model at all, two of the same name, solids and outlines together, edges
+                and vertices of outlines.
         """
-        self.models = tuple(models)
+        self.models: tuple[Polyhedron | Polygon, ...] = tuple(models)
         if not self.models:
             raise ValueError("a recogniser needs at least one model; the library is empty")
         names = [model.name for model in self.models]
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
             raise ValueError(f"two models are called {twice[0]!r}; names must differ")
+        if features not in ("faces", "all"):
+            raise ValueError(f"features is {features!r}; it must be 'faces' or 'all'")
+        solids = [model for model in self.models if isinstance(model, Polyhedron)]
+        outlines = [model for model in self.models if isinstance(model, Polygon)]
+        if solids and outlines:
+            raise ValueError(
+                f"{solids[0].name!r} is a solid and {outlines[0].name!r} an outline of the plane;"
+                " a library has one kind"
+            )
+        if outlines and features == "all":
+            raise ValueError("features 'all' is for solids; outlines have edges alone")
+        self.dimension = 3 if solids else 2
         self.constraints = constraints or Constraints()
         self.tolerance = tolerance or PoseTolerance()
         self.limits = limits or SearchLimits()
-        self._entries = tuple(
-            _Entry(model, PairTables.of(model), ModelTest(model)) for model in self.models
+        self._solids = tuple(
+            SolidEntry.of(model, edges=features == "all", cache=cache) for model in solids
         )
+        self._outlines = tuple(PlanarEntry.of(model) for model in outlines)
+        self._spans = np.array([model.diameter for model in self.models])
 
-    def tables(self, name: str) -> PairTables:
+    def tables(self, name: str) -> PairTables | PlanarTables:
         """The range tables of one model.
 
         Raises:
             ValueError: no model of that name.
         """
         return self._entry(name).tables
+
+    def features(self, name: str) -> Features:
+        """What of a solid contacts may lie on; interpretations are rows of its indices.
+
+        Raises:
+            ValueError: no model of that name, or an outline.
+        """
+        entry = self._entry(name)
+        if isinstance(entry, PlanarEntry):
+            raise ValueError(f"{name!r} is an outline; its features are its edges")
+        return entry.features
 
     def sample_poses(
         self, hypothesis: Hypothesis, contacts: Contacts, most: int = 256
@@ -112,104 +145,118 @@ class Recognizer:
             A stack of poses, model to world, the hypothesis's own first.
         """
         entry = self._entry(hypothesis.object_name)
-        if hypothesis.determined:
-            return RigidTransform.from_matrix(hypothesis.pose.as_matrix()[None])
-        largest = float(contacts.position_error.max())
-        diameter = entry.model.diameter
-        step = 0.5 * min(
-            self.tolerance.distance(diameter, largest), self.tolerance.rotation * diameter / 2.0
-        )
-        faces = hypothesis.interpretations[0]
-        return entry.test.span(faces, contacts, hypothesis.pose, hypothesis.freedoms, step, most)
+        if isinstance(entry, PlanarEntry):
+            return span_polygon(entry, hypothesis, contacts, self.tolerance, most)
+        return span_solid(entry, hypothesis, contacts, self.tolerance, most)
 
-    def _entry(self, name: str) -> _Entry:
-        for entry in self._entries:
+    def _entry(self, name: str) -> SolidEntry | PlanarEntry:
+        for entry in (*self._solids, *self._outlines):
             if entry.model.name == name:
                 return entry
         known = ", ".join(model.name for model in self.models)
         raise ValueError(f"no model is called {name!r}; there are: {known}")
 
-    def recognize(self, contacts: Contacts) -> Belief:
+    def recognize(self, contacts: Contacts, *, outliers: int = 0) -> Belief:
         """Every (object, pose) that the contacts allow.
 
         Args:
             contacts: at least one contact on the object.
+            outliers: how many of them, at most, may be on no face of it (the null face of Grimson
+                and Lozano-Perez 1987); -1 stands for none in an interpretation.
 
         Returns:
-            The belief; empty if no object of the library fits.
+            The belief; empty if no object of the library fits. Hypotheses with fewer outliers come
+            first.
 
         Raises:
-            ValueError: no contacts.
+            ValueError: no contacts, contacts of the plane for a library of solids or the other way
+                round, outliers below zero or in the plane.
         """
         if not len(contacts):
             raise ValueError("no contacts: before the first touch every object and pose fits")
-        order = spread_order(contacts)
-        back = np.argsort(order)
-        found: list[Hypothesis] = []
-        logs, searches = [], []
-        for entry in self._entries:
-            hypotheses, log_weights, search = self._search(entry, contacts[order])
-            found += [replace(h, interpretations=h.interpretations[:, back]) for h in hypotheses]
-            logs.append(log_weights)
-            searches.append(search)
-        weights = _normalised(np.concatenate(logs))
-        ranked = [
-            replace(found[index], weight=float(weights[index]))
-            for index in np.argsort(-weights, kind="stable")
-        ]
-        return Belief(tuple(ranked), tuple(searches))
+        self._check(contacts, outliers)
+        return self._believe(contacts, spread_order(contacts), outliers, None)
 
-    def _search(
-        self, entry: _Entry, contacts: Contacts
-    ) -> tuple[list[Hypothesis], NDArray[np.float64], Search]:
-        """Tree and model tests in turn, then clusters, for one model and sorted contacts."""
-        limits, count = self.limits, len(contacts)
-        tree = InterpretationTree(entry.tables, contacts, self.constraints)
-        faces, complete = root(), True
-        tree_seconds = pose_seconds = 0.0
-        step = limits.first_stage
-        while True:
-            start = faces.shape[1]
-            started = perf_counter()
-            if len(faces):
-                stop = min(count, start + step)
-                cap = limits.flood if stop > start + 1 else limits.budget
-                grown, whole = tree.extend(faces, stop, min(cap, limits.budget))
-                if not whole and stop > start + 1:
-                    stop = start + 1
-                    grown, whole = tree.extend(faces, stop, limits.budget)
-                faces = grown
-                complete &= whole
-            tree_seconds += perf_counter() - started
-            if not len(faces) or faces.shape[1] == count:
-                break
-            if len(faces) > limits.crowd:
-                # Rejecting part of an interpretation rejects every way to complete it.
-                started = perf_counter()
-                faces = entry.test.prune(faces, contacts[: faces.shape[1]])
-                pose_seconds += perf_counter() - started
-            step = limits.stage if len(faces) <= limits.crowd else 1
-        pruned = len(faces)
-        started = perf_counter()
-        if not pruned:
-            faces = np.zeros((0, count), np.int32)
-        poses = entry.test.run(faces, contacts)
-        pose_seconds += perf_counter() - started
-        started = perf_counter()
-        largest = float(contacts.position_error.max())
-        hypotheses, log_weights = cluster(entry.model, poses, self.tolerance, largest)
-        search = Search(
-            object_name=entry.model.name,
-            nodes=tree.nodes,
-            pruned=pruned,
-            tested=len(poses),
-            hypotheses=len(hypotheses),
-            complete=complete,
-            tree_seconds=tree_seconds,
-            pose_seconds=pose_seconds,
-            cluster_seconds=perf_counter() - started,
-        )
-        return hypotheses, log_weights, search
+    def extend(self, belief: Belief, contacts: Contacts) -> Belief:
+        """The belief after further contacts; see `Belief.update`."""
+        self._check(contacts, belief.outliers)
+        known = len(belief.contacts)
+        everything = Contacts.join([belief.contacts, contacts])
+        # Without outliers an interpretation of all contacts is one of the first ones, extended.
+        if self.dimension == 2 or belief.outliers or not belief.complete:
+            return self.recognize(everything, outliers=belief.outliers)
+        order = np.concatenate([np.arange(known), known + spread_order(contacts)])
+        return self._believe(everything, order, belief.outliers, belief)
+
+    def _check(self, contacts: Contacts, outliers: int) -> None:
+        if contacts.dimension != self.dimension:
+            kinds = {2: "outlines of the plane", 3: "solids"}
+            raise ValueError(
+                f"contacts have {contacts.dimension} coordinates, but the library is of"
+                f" {kinds[self.dimension]}: give {self.dimension}"
+            )
+        if outliers < 0:
+            raise ValueError(f"outliers is {outliers}; it must be zero or more")
+        if outliers and self.dimension == 2:
+            raise ValueError("outliers are not supported for outlines of the plane")
+
+    def _believe(
+        self, contacts: Contacts, order: NDArray[np.intp], outliers: int, before: Belief | None
+    ) -> Belief:
+        back = np.argsort(order)
+        ordered = contacts[order]
+        span = least_span(ordered.positions, ordered.position_error) if outliers == 0 else 0.0
+        hypotheses: list[Hypothesis] = []
+        logs, searches = [], []
+        for entry in self._outlines:
+            found = search_polygon(entry, ordered, self.constraints, self.tolerance, self.limits)
+            _note(found, hypotheses, logs, searches)
+        for entry, diameter in zip(self._solids, self._spans, strict=False):
+            # Memo, Section 7: no two contacts are farther apart than the object is wide.
+            if span > diameter * (1.0 + 1e-9):
+                searches.append(Search.none(entry.model.name, len(contacts)))
+                continue
+            found = search_solid(
+                entry,
+                ordered,
+                self.constraints,
+                self.tolerance,
+                self.limits,
+                outliers=outliers,
+                prefixes=_interpretations(before, entry.model.name),
+            )
+            _note(found, hypotheses, logs, searches)
+        weights = _normalised(np.concatenate(logs) if logs else np.zeros(0))
+        nulls = np.array([(h.interpretations < 0).sum(axis=1).min() for h in hypotheses])
+        ranked = [
+            replace(
+                hypotheses[index],
+                weight=float(weights[index]),
+                interpretations=hypotheses[index].interpretations[:, back],
+            )
+            for index in np.lexsort((-weights, nulls))
+        ]
+        return Belief(tuple(ranked), tuple(searches), contacts, self, outliers)
+
+
+def _note(
+    found: Found,
+    hypotheses: list[Hypothesis],
+    logs: list[NDArray[np.float64]],
+    searches: list[Search],
+) -> None:
+    hypotheses += found[0]
+    logs.append(found[1])
+    searches.append(found[2])
+
+
+def _interpretations(belief: Belief | None, name: str) -> NDArray[np.int32] | None:
+    """(m, k) all of a model's in a belief; None without a belief."""
+    if belief is None:
+        return None
+    rows = [h.interpretations for h in belief.hypotheses if h.object_name == name]
+    none = np.zeros((0, len(belief.contacts)), np.int32)
+    return np.ascontiguousarray(np.concatenate([none, *rows]), np.int32)
 
 
 def _normalised(log_weights: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -1,8 +1,9 @@
 """The interpretation tree: a face for each contact, pruned by pairs (memo, Section 2).
 
 Level k of the tree pairs contact k with every face of the model. A branch lives while every two of
-its pairings are possible together, which four constraints on pairs decide; each is an outer bound
-on what contacts inside their error bounds can show, so the true interpretation is never pruned.
+its pairings are possible together, which four constraints on pairs decide, and every three, if one
+of two constraints on triples is asked for; each is an outer bound on what contacts inside their
+error bounds can show, so the true interpretation is never pruned.
 """
 
 from __future__ import annotations
@@ -12,16 +13,18 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from . import tree_kernels
+from . import planar_kernels, tree_kernels
 from .contacts import Contacts
+from .planar_ranges import PlanarTables
 from .ranges import PairTables
+from .triples import grow_by_triples
 
 WORD = 64
 
 
 @dataclass(frozen=True, kw_only=True)
 class Constraints:
-    """Which constraints on pairs of contacts prune the tree."""
+    """Which constraints on pairs and on triples of contacts prune the tree."""
 
     distance: bool = True
     """Distance between the contacts (Section 2.1.1)."""
@@ -33,6 +36,18 @@ class Constraints:
     """Angle of the separation against either normal (Section 2.1.3, simple direction).
 
     Off by default: `component` and `distance` together leave it little to do.
+    """
+    triple: bool = False
+    """Angles of the triangle of any three contacts (Section 2.1.3, the alternative form).
+
+    Needs no normals. Beside `distance` it knows in which direction one face lies from another.
+    Off by default: with normals, `component` leaves it little to do.
+    """
+    area: bool = False
+    """Area of the triangle of any three contacts (Section 2.1, named in passing).
+
+    Needs no normals. It prunes where three distances fit pair by pair, but not together. Off by
+    default, as `triple` is.
     """
 
     @property
@@ -62,7 +77,7 @@ class Pruned:
 class InterpretationTree:
     """One model's tree over contacts in a fixed order, grown a few levels at a time."""
 
-    tables: PairTables
+    tables: PairTables | PlanarTables
     contacts: Contacts
     constraints: Constraints
     nodes: NDArray[np.int64] = field(init=False)
@@ -77,6 +92,9 @@ class InterpretationTree:
             self._all_faces[face // WORD] |= np.uint64(1) << np.uint64(face % WORD)
         self._domains = np.tile(self._all_faces, (count, 1))
         self._masks = np.empty((count, count, faces, words), np.uint64)
+        self._by_triples = self.constraints.triple or self.constraints.area
+        if self._by_triples and isinstance(self.tables, PlanarTables):
+            raise ValueError("the constraints triple and area are for polyhedra, not for outlines")
 
     def extend(
         self, prefixes: NDArray[np.int32], stop: int, budget: int
@@ -96,7 +114,9 @@ class InterpretationTree:
             # Later pairs matter only for faces that some surviving interpretation uses.
             self._domains[level] = _as_bits(prefixes[:, level], len(self._all_faces))
         tables, contacts = self.tables, self.contacts
-        tree_kernels.pair_masks(
+        planar = isinstance(tables, PlanarTables)
+        pair_masks = planar_kernels.pair_masks if planar else tree_kernels.pair_masks
+        pair_masks(
             contacts.positions[:stop],
             contacts.normals[:stop],
             contacts.position_error[:stop],
@@ -113,6 +133,19 @@ class InterpretationTree:
             self.constraints.bits,
             self._masks,
         )
+        if self._by_triples and isinstance(tables, PairTables):
+            return grow_by_triples(
+                tables.triples,
+                contacts,
+                prefixes,
+                self._domains,
+                self._masks,
+                stop,
+                budget,
+                self.nodes,
+                angles=self.constraints.triple,
+                areas=self.constraints.area,
+            )
         return tree_kernels.grow(prefixes, self._domains, self._masks, stop, budget, self.nodes)
 
 
@@ -132,22 +165,7 @@ def far_apart_order(positions: NDArray[np.float64]) -> NDArray[np.intp]:
     Returns:
         (n,) row indices.
     """
-    count = len(positions)
-    if count < 2:
-        return np.arange(count)
-    apart = np.linalg.norm(positions[:, None] - positions, axis=2)
-    first, second = np.unravel_index(int(apart.argmax()), apart.shape)
-    if first == second:
-        return np.arange(count)
-    order = [int(first), int(second)]
-    gap = np.minimum(apart[first], apart[second])
-    gap[order] = -1.0
-    while len(order) < count:
-        farthest = int(gap.argmax())
-        order.append(farthest)
-        gap = np.minimum(gap, apart[farthest])
-        gap[order] = -1.0
-    return np.array(order)
+    return tree_kernels.farthest_first(np.ascontiguousarray(positions))
 
 
 def spread_order(contacts: Contacts) -> NDArray[np.intp]:
@@ -155,33 +173,35 @@ def spread_order(contacts: Contacts) -> NDArray[np.intp]:
 
     Different normals early let a partial interpretation fix its pose early: where all contacts so
     far are on one plane, the tree has little to prune with and the model test less. Half a turn
-    between normals counts as much as the largest distance between contacts.
+    between normals counts as much as the largest extent of the contacts along an axis.
 
     Returns:
         (n,) row indices.
     """
-    between = contacts.positions[:, None] - contacts.positions
-    reach = float(np.linalg.norm(between, axis=2).max(initial=0.0))
+    reach = float(np.ptp(contacts.positions, axis=0).max(initial=0.0))
     scaled = contacts.positions / reach if reach > 0.0 else contacts.positions
-    return far_apart_order(np.column_stack([scaled, contacts.normals / 2.0]))
+    return tree_kernels.farthest_first(np.hstack([scaled, contacts.normals / 2.0]))
 
 
 def prune(
-    tables: PairTables,
+    tables: PairTables | PlanarTables,
     contacts: Contacts,
     *,
     constraints: Constraints | None = None,
     sort: bool = True,
     budget: int = 1_000_000,
 ) -> Pruned:
-    """All interpretations that the constraints on pairs allow; no poses are computed.
+    """All interpretations that the constraints allow; no poses are computed.
 
     Args:
         tables: the model's range tables.
         contacts: what was felt.
-        constraints: which constraints prune; all but the simple direction one by default.
+        constraints: which constraints prune; by default distance, angle and component.
         sort: far-apart contacts first; otherwise in the given order.
         budget: the most interpretations to return.
+
+    Raises:
+        ValueError: constraints on triples for an outline.
     """
     order = far_apart_order(contacts.positions) if sort else np.arange(len(contacts))
     tree = InterpretationTree(tables, contacts[order], constraints or Constraints())

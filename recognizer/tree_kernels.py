@@ -27,6 +27,55 @@ def _angle_between(u, v):
 
 
 @njit(cache=True)
+def farthest_first(rows):
+    """An order of (n, k) rows: the two farthest apart, then always the farthest from all before."""
+    count = len(rows)
+    order = np.arange(count)
+    apart = np.zeros((count, count))
+    best = 0.0
+    first, second = -1, -1
+    for i in range(count):
+        for j in range(i + 1, count):
+            squared = 0.0
+            for k in range(rows.shape[1]):
+                squared += (rows[i, k] - rows[j, k]) ** 2
+            apart[i, j] = squared
+            apart[j, i] = squared
+            if squared > best:
+                best, first, second = squared, i, j
+    if first < 0:
+        return order
+    gap = np.minimum(apart[first], apart[second])
+    gap[first] = -1.0
+    gap[second] = -1.0
+    order[0], order[1] = first, second
+    for at in range(2, count):
+        farthest = 0
+        for i in range(1, count):
+            if gap[i] > gap[farthest]:
+                farthest = i
+        order[at] = farthest
+        gap = np.minimum(gap, apart[farthest])
+        gap[farthest] = -1.0
+        for i in range(at):
+            gap[order[i]] = -1.0
+    return order
+
+
+@njit(cache=True)
+def least_span(points, errors):
+    """The least that the farthest two of (n, 3) points can be apart, (n,) bounds on each."""
+    most = 0.0
+    for i in range(len(points)):
+        for j in range(i):
+            squared = 0.0
+            for k in range(points.shape[1]):
+                squared += (points[i, k] - points[j, k]) ** 2
+            most = max(most, np.sqrt(squared) - errors[i] - errors[j])
+    return most
+
+
+@njit(cache=True)
 def pair_masks(
     positions,
     normals,

@@ -1,92 +1,83 @@
 """Measure the recogniser: `python -m palpate.scripts.bench`, or `make bench`.
 
-Grid contacts on the stand-ins, single core, everything warm.
+Grid contacts on the stand-ins and on random solids, one thread, everything warm, each figure
+beside its goal where it has one.
 """
 
 from __future__ import annotations
 
-from time import perf_counter
+import os
+from enum import StrEnum
+from typing import Annotated
 
-import numpy as np
-from rich.console import Console
-from rich.progress import track
-from rich.table import Table
+import typer
 
-from ..envs.grid import sense_grid
-from ..envs.library import load_library
-from ..envs.probe_env import INCH
-from ..envs.sensor import SensorNoise
-from ..recognizer import PairTables, Polyhedron, Recognizer, pose_difference
-from ..recognizer.tree import prune
-
-CASES = (
-    ("housing", 10, 0.01),
-    ("housing", 10, 0.05),
-    ("housing-34", 10, 0.05),
-    ("simple-hand", 10, 0.01),
-    ("stapler", 10, 0.01),
-    ("complex-hand", 10, 0.01),
-    ("complex-hand", 10, 0.05),
-)
-TRIALS = 200
+QUICK = 10
+"""What `--quick` divides cases and models by."""
 
 
-def main() -> None:
-    """Print the tables."""
-    console = Console()
-    models = {model.name: model for model in load_library()}
-    console.print("Range tables, once a model:")
-    for model in models.values():
-        started = perf_counter()
-        PairTables.of(model)
-        seconds = perf_counter() - started
-        console.print(f"  {model.name:<13}{model.face_count:>3} faces {1e3 * seconds:>6.0f} ms")
-    shown = Table("object", "normal", "dist", "tree", "all", "degrees", "inches", "n", box=None)
-    for column in shown.columns:
-        column.no_wrap = True
-    for column in shown.columns[2:]:
-        column.justify = "right"
-    for name, pi_over, dist in track(CASES, description="cases", transient=True):
-        noise = SensorNoise(position_error=dist * INCH, normal_error=np.pi / pi_over)
-        shown.add_row(name, f"π/{pi_over}", f"{dist:.2f}", *_measure(models[name], noise))
-    console.print(
-        f"\nOne object, 16 grid contacts, {TRIALS} cases. tree: masks and tree, all: contacts to\n"
-        "belief, milliseconds, median / 99th percentile. degrees, inches: mean error of the\n"
-        "right hypothesis over the n cases whose contacts fix all six freedoms.\n"
-    )
-    console.print(shown)
+class Part(StrEnum):
+    """What can be measured on its own."""
+
+    SPEED = "speed"
+    ICP = "icp"
+    START = "start"
+    SCALE = "scale"
+    ACCURACY = "accuracy"
+    TABLES = "tables"
 
 
-def _measure(model: Polyhedron, noise: SensorNoise) -> tuple[str, ...]:
-    recognizer = Recognizer([model])
-    tables = recognizer.tables(model.name)
-    rng = np.random.default_rng(0)
-    tree, everything, errors = [], [], []
-    for _ in range(TRIALS):
-        truth = sense_grid(model, rng, 16, 16)
-        contacts = truth.noisy(noise, rng)
-        started = perf_counter()
-        prune(tables, contacts)
-        tree.append(perf_counter() - started)
-        started = perf_counter()
-        belief = recognizer.recognize(contacts)
-        everything.append(perf_counter() - started)
-        right = [
-            hypothesis
-            for hypothesis in belief.hypotheses
-            if (hypothesis.interpretations == truth.faces).all(axis=1).any()
-        ]
-        if right and right[0].determined:
-            error = pose_difference(model, right[0].pose, truth.T_world_object)
-            errors.append((np.degrees(error.rotation), error.translation / INCH))
-    rotation, shift = np.mean(errors, axis=0) if errors else (np.nan, np.nan)
-    return (_spread(tree), _spread(everything), f"{rotation:.2f}", f"{shift:.4f}", str(len(errors)))
+def bench(
+    cases: Annotated[int, typer.Option(metavar="N", min=1, help="Random cases a row.")] = 200,
+    library: Annotated[
+        int, typer.Option(metavar="N", min=50, help="Models in the large library.")
+    ] = 1000,
+    seed: Annotated[int, typer.Option(metavar="N", min=0, help="Seed of the cases.")] = 0,
+    only: Annotated[
+        list[Part] | None,
+        typer.Option(metavar="PART", help=f"Only this part; one or more of: {', '.join(Part)}."),
+    ] = None,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="A tenth of the cases and of the library.")
+    ] = False,
+) -> None:
+    """Measure speed, accuracy and growth of the recogniser on one thread; beside it, ICP.
+
+    speed: contacts to belief, where the time goes, and the floor of the bit operations. icp: the
+    same contacts given to multi-start ICP. start: the first belief of a fresh process. scale: a
+    large library, large models. accuracy: pose errors beside the memo's Table V. tables: range
+    tables, once a model.
+    """
+    keep_to_one_thread()
+    # Only now: what these import reads the number of threads once.
+    from .bench_accuracy import measure_accuracy
+    from .bench_icp import measure_icp
+    from .bench_report import Settings, show, show_header
+    from .bench_scale import measure_scale, measure_start, measure_tables
+    from .bench_speed import measure_speed
+
+    parts = {
+        Part.SPEED: measure_speed,
+        Part.ICP: measure_icp,
+        Part.START: measure_start,
+        Part.SCALE: measure_scale,
+        Part.ACCURACY: measure_accuracy,
+        Part.TABLES: measure_tables,
+    }
+    share = QUICK if quick else 1
+    settings = Settings(cases=max(cases // share, 1), library=library // share, seed=seed)
+    show_header(settings)
+    for part in only or parts:
+        show(parts[part](settings))
 
 
-def _spread(seconds: list[float]) -> str:
-    median, tail = 1e3 * np.percentile(seconds, (50, 99))
-    return f"{median:.2f} / {tail:.2f}"
+def keep_to_one_thread() -> None:
+    """Keep numerical libraries to one thread; numba's kernels here have no other."""
+    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ[name] = "1"
 
 
 if __name__ == "__main__":
-    main()
+    app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+    app.command()(bench)
+    app()

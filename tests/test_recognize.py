@@ -74,7 +74,7 @@ def assert_consistent(belief: Belief, contacts: Contacts, names: tuple[str, ...]
         assert search.pruned >= search.tested
         assert search.nodes.shape == (len(contacts),)
         assert (search.nodes > 0).all() or search.tested == 0
-        assert min(search.tree_seconds, search.pose_seconds, search.cluster_seconds) >= 0.0
+        assert min(search.search_seconds, search.cluster_seconds) >= 0.0
     assert belief.interpretations == sum(search.tested for search in belief.searches)
     assert belief.complete == all(search.complete for search in belief.searches)
     for hypothesis in belief.hypotheses:
@@ -339,17 +339,13 @@ def test_a_search_cut_short_says_so(recognizer: Recognizer) -> None:
     assert_consistent(short, contacts, ("housing",))
 
 
-@pytest.mark.parametrize("first_stage", [1, 3, 100])
-@pytest.mark.parametrize("stage", [1, 100])
-@pytest.mark.parametrize("crowd", [1, 10_000])
-def test_how_the_tree_is_grown_does_not_change_what_is_found(
-    cube: Polyhedron, first_stage: int, stage: int, crowd: int
-) -> None:
+@pytest.mark.parametrize("crowd", [1, 8, 10_000])
+def test_how_the_tree_is_grown_does_not_change_what_is_found(cube: Polyhedron, crowd: int) -> None:
     rng = np.random.default_rng(16)
     block = Polyhedron.from_mesh(trimesh.creation.box((0.07, 0.05, 0.03)), name="block")
     touches = touch_faces(block, rng, [0, 1, 2, 3, 4, 5, 0, 1])
     contacts = feel(touches, rng, 5e-4, 0.2)
-    limits = SearchLimits(first_stage=first_stage, stage=stage, crowd=crowd)
+    limits = SearchLimits(crowd=crowd)
 
     def found(recognizer: Recognizer) -> list[tuple[str, tuple[int, ...]]]:
         return sorted(
@@ -409,23 +405,24 @@ def test_a_recogniser_takes_any_iterable_of_models(cube: Polyhedron) -> None:
 # Uniqueness
 
 
-def hand_made(count: int, *, determined: bool, complete: bool) -> Belief:
+def hand_made(cube: Polyhedron, count: int, *, determined: bool, complete: bool) -> Belief:
     freedoms = np.zeros((0, 6)) if determined else np.eye(6)[:1]
     hypotheses = tuple(
         Hypothesis(
             f"object {k}",
-            RigidTransform.identity(),
+            np.eye(4),
             1 / count,
             np.zeros((2, 3), np.int32),
             freedoms,
+            np.eye(6),
         )
         for k in range(count)
     )
     searches = tuple(
-        Search(f"object {k}", np.ones(3, np.int64), 2, 2, 1, complete or k != 1, 0.0, 0.0, 0.0)
+        Search(f"object {k}", np.ones(3, np.int64), 2, 2, 1, complete or k != 1, 0, 0.0, 0.0)
         for k in range(2)
     )
-    return Belief(hypotheses, searches)
+    return Belief(hypotheses, searches, Contacts.none(), Recognizer([cube]))
 
 
 @pytest.mark.parametrize(
@@ -439,9 +436,9 @@ def hand_made(count: int, *, determined: bool, complete: bool) -> Belief:
     ],
 )
 def test_unique_means_one_hypothesis_with_a_fixed_pose_and_a_whole_search(
-    count: int, determined: bool, complete: bool, unique: bool
+    cube: Polyhedron, count: int, determined: bool, complete: bool, unique: bool
 ) -> None:
-    belief = hand_made(count, determined=determined, complete=complete)
+    belief = hand_made(cube, count, determined=determined, complete=complete)
     assert belief.unique == unique
     assert belief.complete == complete
     assert belief.empty == (count == 0)

@@ -1,0 +1,466 @@
+"""Compiled bounds on where a pose can be: a region that holds every pose within the bounds.
+
+A small motion ``z = (w, s)`` of the object, in its own frame, turns it by ``w`` about a pivot and
+shifts it by ``s``: a contact ``x`` becomes ``x - w x a - s`` with the lever ``a = x - pivot``, up to
+a remainder that is quadratic in ``w``. Every pose within the bounds keeps each reading's linear part
+within its bound plus that remainder, so the weighted sum of their squares confines ``z`` to an
+ellipsoid. A smaller ellipsoid has smaller remainders, which confine it further: a few rounds take
+the half radian that the normals leave to the degree that the positions allow.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from .polygon_kernels import INSIDE
+from .reading_kernels import RAY
+
+ROUNDS = 10
+SHRINKS = 0.9
+PATIENCE = 3
+"""Rounds go on until so many in a row have not shrunk the region below this share of its size."""
+
+
+@njit(cache=True)
+def invert_symmetric(matrix, inverse, factor):
+    """Invert a positive definite (k, k) matrix by Cholesky; returns whether it is one."""
+    size = len(matrix)
+    for a in range(size):
+        for b in range(a + 1):
+            value = matrix[a, b]
+            for k in range(b):
+                value -= factor[a, k] * factor[b, k]
+            if a == b:
+                if not value > 0.0:
+                    return False
+                factor[a, a] = np.sqrt(value)
+            else:
+                factor[a, b] = value / factor[b, b]
+    # The factor's inverse, in place of its lower triangle.
+    for a in range(size):
+        factor[a, a] = 1.0 / factor[a, a]
+        for b in range(a):
+            value = 0.0
+            for k in range(b, a):
+                value -= factor[a, k] * factor[k, b]
+            factor[a, b] = value * factor[a, a]
+    for a in range(size):
+        for b in range(a + 1):
+            value = 0.0
+            for k in range(a, size):
+                value += factor[k, a] * factor[k, b]
+            inverse[a, b] = value
+            inverse[b, a] = value
+    return True
+
+
+@njit(cache=True)
+def largest_eigenvalue(m):
+    """Of a symmetric (3, 3) matrix, or of a larger one's first block, in closed form (Smith 1961), rounded up."""
+    off = m[0, 1] * m[0, 1] + m[0, 2] * m[0, 2] + m[1, 2] * m[1, 2]
+    mean = (m[0, 0] + m[1, 1] + m[2, 2]) / 3.0
+    d0, d1, d2 = m[0, 0] - mean, m[1, 1] - mean, m[2, 2] - mean
+    size = np.sqrt((d0 * d0 + d1 * d1 + d2 * d2 + 2.0 * off) / 6.0)
+    if size <= 1e-300:
+        return mean
+    half = (
+        d0 * (d1 * d2 - m[1, 2] * m[1, 2])
+        - m[0, 1] * (m[0, 1] * d2 - m[1, 2] * m[0, 2])
+        + m[0, 2] * (m[0, 1] * m[1, 2] - d1 * m[0, 2])
+    ) / (2.0 * size * size * size)
+    angle = np.arccos(min(1.0, max(-1.0, half))) / 3.0
+    return mean + 2.0 * size * np.cos(angle) + 1e-7 * size
+
+
+@njit(cache=True)
+def square_root(spread, root):
+    """Cholesky factor of a (3, 3) form, lower, into ``root``; null directions come out null."""
+    for a in range(3):
+        for b in range(a + 1):
+            value = spread[a, b]
+            for k in range(b):
+                value -= root[a, k] * root[b, k]
+            if a == b:
+                root[a, a] = np.sqrt(max(value, 0.0))
+            else:
+                root[a, b] = value / root[b, b] if root[b, b] > 1e-150 else 0.0
+            if b < a:
+                root[b, a] = 0.0
+
+
+@njit(cache=True)
+def remainder(lever, direction, root, angle):
+    """How far a turn within a region can move a lever's end along a direction beyond linear.
+
+    A turn by w moves the end of a by ``sinc |w| (w x a) + (1 - cos |w|) / |w|^2 w x (w x a)``
+    (Rodrigues). Along m the second is the form ``(w . a)(w . m) - |w|^2 (a . m)`` with a factor of
+    at most a half, and the first differs from ``w x a`` by a share of at most ``|w|^2 / 6``.
+
+    Args:
+        lever: (3,) a.
+        direction: (3,) m.
+        root: (3, 3) lower L; the region's ``w`` are ``L v`` with ``|v| <= 1``.
+        angle: bound on |w|, radians.
+    """
+    a0, a1, a2 = lever[0], lever[1], lever[2]
+    m0, m1, m2 = direction[0], direction[1], direction[2]
+    l00, l10, l11 = root[0, 0], root[1, 0], root[1, 1]
+    l20, l21, l22 = root[2, 0], root[2, 1], root[2, 2]
+    # L^T a, L^T m and L^T (a x m).
+    p0, p1, p2 = l00 * a0 + l10 * a1 + l20 * a2, l11 * a1 + l21 * a2, l22 * a2
+    q0, q1, q2 = l00 * m0 + l10 * m1 + l20 * m2, l11 * m1 + l21 * m2, l22 * m2
+    c0, c1, c2 = a1 * m2 - a2 * m1, a2 * m0 - a0 * m2, a0 * m1 - a1 * m0
+    t0, t1, t2 = l00 * c0 + l10 * c1 + l20 * c2, l11 * c1 + l21 * c2, l22 * c2
+    along = a0 * m0 + a1 * m1 + a2 * m2
+    f00 = p0 * q0 - along * (l00 * l00 + l10 * l10 + l20 * l20)
+    f11 = p1 * q1 - along * (l11 * l11 + l21 * l21)
+    f22 = p2 * q2 - along * l22 * l22
+    f01 = 0.5 * (p0 * q1 + p1 * q0) - along * (l10 * l11 + l20 * l21)
+    f02 = 0.5 * (p0 * q2 + p2 * q0) - along * l20 * l22
+    f12 = 0.5 * (p1 * q2 + p2 * q1) - along * l21 * l22
+    bent = np.sqrt(f00 * f00 + f11 * f11 + f22 * f22 + 2.0 * (f01 * f01 + f02 * f02 + f12 * f12))
+    linear = np.sqrt(t0 * t0 + t1 * t1 + t2 * t2)
+    return 0.5 * bent + angle * angle / 6.0 * linear
+
+
+@njit(cache=True)
+def turn_between(one, other, turn):
+    """The rotation vector of ``one^T other`` into (3,) ``turn``; returns its length, radians."""
+    trace = 0.0
+    for k in range(3):
+        a, b = (k + 1) % 3, (k + 2) % 3
+        turn[k] = 0.0
+        for i in range(3):
+            turn[k] += 0.5 * (one[i, b] * other[i, a] - one[i, a] * other[i, b])
+            trace += one[i, k] * other[i, k]
+    sine = np.sqrt(turn[0] ** 2 + turn[1] ** 2 + turn[2] ** 2)
+    angle = np.arctan2(sine, 0.5 * (trace - 1.0))
+    if sine > 1e-9:
+        for k in range(3):
+            turn[k] *= angle / sine
+    return angle
+
+
+@njit(cache=True)
+def ball_radius(angle, longest):
+    """Radius, in rotation vectors of lengths up to ``longest``, that holds a ball of rotations.
+
+    It is about the vector to the ball's centre, unless the longest is a right angle or more: then
+    it is about zero. The exponential shortens lengths by a share of 2 sin(W / 2) / W at least, and
+    balls of less than a right angle are convex, so that the way between two of its rotations stays
+    among them.
+    """
+    if longest >= 0.5 * np.pi:
+        return longest
+    return angle * 0.5 * longest / np.sin(0.5 * longest) + 1e-9
+
+
+@njit(cache=True)
+def region_workspace(count):
+    """Work space of `bound_region` for a number of contacts, with a region in it.
+
+    Returns:
+        spread (3, 3): every pose's ``w`` has ``(w . p)^2 <= p^T spread p``; inverse (6, 6) and centre
+        (6,): every pose's ``z`` has ``((z - centre) . p)^2 <= p^T inverse p``; and work space.
+    """
+    return (
+        np.empty((3, 3)),
+        np.empty((6, 6)),
+        np.empty(6),
+        (np.empty((6, 6)), np.empty((6, 6)), np.zeros((6, 6))),
+        (np.empty(6), np.empty(6), np.empty(3)),
+        np.empty((3, 3)),
+        (np.empty((2 * count, 6)), np.empty((6, 2 * count)), np.empty(2 * count, np.int64)),
+        np.empty(count),
+    )
+
+
+@njit(cache=True)
+def _add_row(lever, direction, value, limit, owner, at, table):
+    """Note a place along a direction, which a motion lowers by w . (a x d) + s . d."""
+    rows, numbers, owners = table
+    d0, d1, d2 = direction[0], direction[1], direction[2]
+    rows[at, 0] = lever[1] * d2 - lever[2] * d1
+    rows[at, 1] = lever[2] * d0 - lever[0] * d2
+    rows[at, 2] = lever[0] * d1 - lever[1] * d0
+    rows[at, 3], rows[at, 4], rows[at, 5] = d0, d1, d2
+    numbers[0, at] = value
+    numbers[1, at] = limit
+    numbers[2, at] = 1.0
+    numbers[4, at] = 0.0
+    numbers[5, at] = 0.0
+    owners[at] = owner
+
+
+@njit(cache=True)
+def _note_places(count, faces, targets, x, levers, model, reaches, readings, table):
+    """Places of contacts that are bounded on both sides, as rows; returns how many.
+
+    The height over the face's plane, whatever of the face is nearest; and, for a contact that lies
+    outside it, the place along the gap, which the face bounds ahead and behind. For these the excess
+    and its least possible value are noted too: see `_narrow`.
+    """
+    normals, start, corners = model[0], model[3], model[4]
+    gaps, _, heights, regions, _, _, _ = readings
+    direction = np.empty(3)
+    used = 0
+    for i in range(count):
+        f = faces[i]
+        if f < 0:
+            continue
+        _add_row(levers[i], normals[f], heights[i], reaches[i], i, used, table)
+        used += 1
+        if regions[i] == INSIDE:
+            continue
+        out = 0.0
+        for k in range(3):
+            direction[k] = gaps[i, k] - heights[i] * normals[f, k]
+            out += direction[k] ** 2
+        out = np.sqrt(out)
+        if out < 0.5 * reaches[i]:
+            continue
+        most = 0.0
+        for k in range(3):
+            direction[k] /= out
+            most += direction[k] * (x[i, k] - gaps[i, k])
+        least = most
+        for c in range(start[targets[i]], start[targets[i] + 1]):
+            along = 0.0
+            for k in range(3):
+                along += direction[k] * corners[c, k]
+            least = min(least, along)
+        half = 0.5 * (most - least)
+        _add_row(levers[i], direction, half + out, half + reaches[i], i, used, table)
+        table[1][4, used] = out - reaches[i]
+        table[1][5, used] = -2.0 * (half + reaches[i])
+        used += 1
+    return used
+
+
+@njit(cache=True)
+def _narrow(used, table, centre, inverse):
+    """Bound places beyond an edge from behind too, by how far the region lets them come back.
+
+    Returns:
+        Whether every one can come back inside at all.
+    """
+    rows, numbers, _ = table
+    for r in range(used):
+        if numbers[5, r] == 0.0:
+            continue
+        mean = 0.0
+        square = 0.0
+        for a in range(6):
+            mean += rows[r, a] * centre[a]
+            for b in range(6):
+                square += rows[r, a] * inverse[a, b] * rows[r, b]
+        rest = numbers[3, r] - numbers[1, r]
+        least = numbers[4, r] - mean - np.sqrt(max(square, 0.0)) - rest
+        if least > 0.0:
+            return False
+        if least > numbers[5, r]:
+            numbers[5, r] = min(least, -1e-12)
+            numbers[0, r] = numbers[4, r] - 0.5 * numbers[5, r]
+            numbers[1, r] = -0.5 * numbers[5, r]
+    return True
+
+
+@njit(cache=True)
+def bound_region(
+    count,
+    faces,
+    targets,
+    x,
+    levers,
+    u,
+    model,
+    contacts,
+    readings,
+    reach,
+    rotation,
+    ball,
+    angle,
+    region,
+):
+    """The region around a pose that holds every pose within the bounds.
+
+    The weights of the sum are free; where a round's best fit leaves a reading large, it counts more
+    in the next (Lawson), which makes the region of all bounds together as small as their
+    intersection, and empty if that is.
+
+    Args:
+        count: how many contacts count.
+        faces: (n,) the feature of each, -1 for none.
+        targets: (n,) the polygon that stands for it.
+        x: (n, 3) contacts, object frame, metres.
+        levers: (n, 3) contacts less the pivot.
+        u: (n, 3) measured normals, object frame.
+        model: see `search_kernels.search_model`.
+        contacts: likewise.
+        readings: see `reading_kernels.read`.
+        reach: a shift of the pivot that no pose within the bounds exceeds, metres.
+        rotation: (3, 3) this pose's, object to world.
+        ball: (3, 3) a rotation that none within the bounds is farther from than ...
+        angle: ... this angle, radians.
+        region: see `region_workspace`; written in place.
+
+    Returns:
+        An angle that bounds every rotation of the region, radians, from this pose, -1 if the region
+        is empty; and one from the region's centre. (Two turns ``exp(v)`` and ``exp(w)`` are at most
+        ``|v - w|`` apart.)
+    """
+    normals = model[0]
+    kinds, misses, directions = readings[4], readings[5], readings[6]
+    chords = contacts[3]
+    spread, inverse, centre, systems, slopes, root, table, cone_weights = region
+    system, trial, factor = systems
+    slope, middle, offset = slopes
+    rows, numbers, owners = table
+    used = _note_places(count, faces, targets, x, levers, model, contacts[2], readings, table)
+    for i in range(count):
+        cone_weights[i] = 1.0
+    # Known beforehand: the ball.
+    off = turn_between(rotation, ball, offset)
+    result = min(off + angle, np.pi)
+    ball_angle = ball_radius(angle, result)
+    if result >= 0.5 * np.pi:
+        offset[:] = 0.0
+        off = 0.0
+    about = result
+    size = 3.0 * result * result
+    centre[:] = 0.0
+    inverse[:] = 0.0
+    for a in range(3):
+        inverse[a, a] = 2.0 * result * result
+        inverse[3 + a, 3 + a] = 2.0 * reach * reach
+        for b in range(3):
+            spread[a, b] = result * result if a == b else 0.0
+    idle = 0
+    for _ in range(ROUNDS):
+        square = result * result
+        square_root(spread, root)
+        # The ball, and |s| <= reach: each adds at most 1 to the sum.
+        allowed = 2.0 - (off / ball_angle) ** 2
+        system[:] = 0.0
+        slope[3:] = 0.0
+        for a in range(3):
+            slope[a] = -offset[a] / (ball_angle * ball_angle)
+            system[a, a] = 1.0 / (ball_angle * ball_angle)
+            system[3 + a, 3 + a] = 1.0 / (reach * reach)
+        for r in range(used):
+            # In a bound widened by its remainder, a place adds at most its weight.
+            wide = numbers[1, r] + remainder(levers[owners[r]], rows[r, 3:], root, result)
+            numbers[3, r] = wide
+            weight = numbers[2, r]
+            value = numbers[0, r] / wide
+            allowed += weight * (1.0 - value * value)
+            share = weight / (wide * wide)
+            pull = weight * value / wide
+            for a in range(6):
+                slope[a] -= pull * rows[r, a]
+                for b in range(a + 1):
+                    system[a, b] += share * rows[r, a] * rows[r, b]
+        # A normal's |u' - m|^2 is 2 - 2 m . u'. Its form in w holds up to 1 - cos t >=
+        # t^2 (1 - t^2 / 12) / 2, its slope up to sinc t >= 1 - t^2 / 6.
+        bend = max(0.0, 1.0 - square / 12.0)
+        p0, p1, p2 = 0.0, 0.0, 0.0
+        misfit = 0.0
+        for i in range(count):
+            f = faces[i]
+            if f < 0 or kinds[i] != RAY:
+                continue
+            share = misses[i] / chords[i]
+            allowed += cone_weights[i] * (1.0 - share * share)
+            misfit += cone_weights[i] * share * share
+            weight = cone_weights[i] / (chords[i] * chords[i])
+            m0, m1, m2 = normals[f, 0], normals[f, 1], normals[f, 2]
+            u0, u1, u2 = u[i, 0], u[i, 1], u[i, 2]
+            p0 += weight * (u1 * m2 - u2 * m1)
+            p1 += weight * (u2 * m0 - u0 * m2)
+            p2 += weight * (u0 * m1 - u1 * m0)
+            along = u0 * m0 + u1 * m1 + u2 * m2
+            weight *= bend
+            system[0, 0] += weight * (along - u0 * m0)
+            system[1, 0] -= 0.5 * weight * (u1 * m0 + u0 * m1)
+            system[1, 1] += weight * (along - u1 * m1)
+            system[2, 0] -= 0.5 * weight * (u2 * m0 + u0 * m2)
+            system[2, 1] -= 0.5 * weight * (u2 * m1 + u1 * m2)
+            system[2, 2] += weight * (along - u2 * m2)
+        slope[0] += p0
+        slope[1] += p1
+        slope[2] += p2
+        steepness = np.sqrt(p0 * p0 + p1 * p1 + p2 * p2)
+        allowed += square / 3.0 * steepness * result + square * square / 24.0 * misfit
+        if not invert_symmetric(system, trial, factor):
+            break
+        # Complete the square about the centre.
+        for a in range(6):
+            value = 0.0
+            for b in range(6):
+                value -= trial[a, b] * slope[b]
+            middle[a] = value
+        for a in range(6):
+            allowed -= slope[a] * middle[a]
+        if allowed < 0.0:
+            return -1.0, 0.0
+        far = np.sqrt(middle[0] ** 2 + middle[1] ** 2 + middle[2] ** 2)
+        near = np.sqrt(max(allowed * largest_eigenvalue(trial), 0.0))
+        # (w . p)^2 <= (|c . p| + sqrt(p E p))^2 <= (1 + t) p E p + (1 + 1 / t) (c . p)^2.
+        share = max(far, 1e-9) / max(near, 1e-12)
+        trace = (1.0 + share) * allowed * (trial[0, 0] + trial[1, 1] + trial[2, 2])
+        trace += (1.0 + 1.0 / share) * far * far
+        idle += 1
+        if trace < size:
+            if trace < SHRINKS * size:
+                idle = 0
+            size = trace
+            about = near
+            for a in range(6):
+                centre[a] = middle[a]
+                for b in range(6):
+                    inverse[a, b] = allowed * trial[a, b]
+            for a in range(3):
+                for b in range(3):
+                    spread[a, b] = (1.0 + share) * inverse[a, b]
+                    spread[a, b] += (1.0 + 1.0 / share) * centre[a] * centre[b]
+        result = min(result, far + near)
+        if idle == PATIENCE:
+            break
+        if not _narrow(used, table, centre, inverse):
+            return -1.0, 0.0
+        _raise_weights(count, faces, u, normals, kinds, chords, used, table, middle, cone_weights)
+    return result, min(about, result + np.sqrt(centre[0] ** 2 + centre[1] ** 2 + centre[2] ** 2))
+
+
+@njit(cache=True)
+def _raise_weights(count, faces, u, normals, kinds, chords, used, table, middle, cone_weights):
+    """Count each reading by how large the fit of this round leaves it."""
+    rows, numbers, _ = table
+    total = 0.0
+    amount = 0
+    for r in range(used):
+        value = numbers[0, r]
+        for a in range(6):
+            value -= rows[r, a] * middle[a]
+        numbers[2, r] *= min(abs(value) / numbers[3, r], 10.0) + 0.05
+        total += numbers[2, r]
+        amount += 1
+    w0, w1, w2 = middle[0], middle[1], middle[2]
+    for i in range(count):
+        f = faces[i]
+        if f < 0 or kinds[i] != RAY:
+            continue
+        u0, u1, u2 = u[i, 0], u[i, 1], u[i, 2]
+        e0 = u0 + u1 * w2 - u2 * w1 - normals[f, 0]
+        e1 = u1 + u2 * w0 - u0 * w2 - normals[f, 1]
+        e2 = u2 + u0 * w1 - u1 * w0 - normals[f, 2]
+        share = np.sqrt(e0 * e0 + e1 * e1 + e2 * e2) / chords[i]
+        cone_weights[i] *= min(share, 10.0) + 0.05
+        total += cone_weights[i]
+        amount += 1
+    scale = amount / max(total, 1e-300)
+    for r in range(used):
+        numbers[2, r] *= scale
+    for i in range(count):
+        cone_weights[i] *= scale

@@ -1,0 +1,345 @@
+"""Compiled search of the interpretation tree with poses in it, depth first.
+
+Every assignment narrows the features left to later contacts, first by pairs (forward checking on
+bit sets), then, where many completions are left, by the pose that the assigned contacts allow: none
+ends the branch, and a region of poses rules out features of later contacts one by one. A leaf gets
+a verdict that is a pose or a proof.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from .possible_kernels import possible
+from .mask_kernels import bit_index, compatible, count_bits, pair_readings
+from .pose_kernels import finish, settle, start_pose
+from .proof_kernels import locate, workspace
+from .reading_kernels import carry
+from .search_pose_kernels import box_stack
+from .region_kernels import square_root
+from .verdict_kernels import FEASIBLE, REJECTED, judge
+
+_ONE = np.uint64(1)
+_NONE = np.uint64(0)
+VAGUE = 1.2
+"""An angle (radians) of rotations too wide for a verdict within the tree to be worth its time."""
+INNER_STEPS = 2
+"""Steps of a verdict within the tree, where it may stay open."""
+NODES, VERDICTS, INNER_REJECTED, BOXES, CUT, LEAVES_TRIED = 0, 1, 2, 3, 4, 5
+"""Places of the counts that a search returns."""
+
+
+@njit(cache=True)
+def _larger(array, size):
+    grown = np.empty((size,) + array.shape[1:], array.dtype)
+    grown[: len(array)] = array
+    return grown
+
+
+@njit(cache=True)
+def search_model(
+    contacts,
+    errors,
+    model,
+    half_angles,
+    middles,
+    packed,
+    prefixes,
+    first_domain,
+    spare,
+    switches,
+    crowd,
+    most_nodes,
+    most_leaves,
+    most_boxes,
+    pool,
+):
+    """All interpretations that some pose allows, each with such a pose.
+
+    Args:
+        contacts: positions (n, 3), metres, and unit normals (n, 3), world frame; bounds on
+            distances (n,), metres, on chords between normals (n,; 2 if unknown) and on sines of
+            the angle between them (n,; 1 if it may be a right angle).
+        errors: (n,) bounds on normals, radians.
+        model: normals (f, 3) and offsets (f,) of the features' planes; (f + 1,) the first convex
+            piece of each feature; (p + 1,) the first corner of each polygon, of which the first f
+            are the features' hulls and the rest their pieces; corners (c, 3); centroid (3,);
+            radius, metres; (f + 1,) the first normal of each feature's cone; normals (k, 3).
+        half_angles: (f,) how far a feature's normals lean from its middle one, radians.
+        middles: (f, 3) a point inside each feature's hull.
+        packed: see `ranges.pack_tables`.
+        prefixes: (m, k) interpretations of the first k contacts to extend; (1, 0) is the root.
+        first_domain: (w,) bit set, the features that the first contact may be on.
+        spare: how many contacts may be on none (-1).
+        switches: bits, which constraints on pairs to apply.
+        crowd: completions of a branch from which poses are asked within the tree.
+        most_nodes: budget of branches.
+        most_leaves: budget of interpretations.
+        most_boxes: the most boxes of rotations to look at for a leaf.
+        pool: the same for all leaves together.
+
+    Returns:
+        (m, n) interpretations; (m, 3, 3) rotations, (m, 3) translations, (m,) least-squares
+        misfits, (m, 6, 6) informations about small motions (see `motion_kernels`), (m,) whether
+        the pose is a witness; (n,) branches at each level; counts (see `NODES`).
+    """
+    points = contacts[0]
+    n, features, words = len(points), packed.shape[2], len(first_domain)
+    start = prefixes.shape[1]
+    readings = np.empty((n, n, 5))
+    pair_readings(contacts, errors, readings)
+    masks = np.empty((n, n, features, words), np.uint64)
+    known = np.zeros((n, n, features), np.bool_)
+    fits = np.zeros(64 * words, np.uint8)
+    fit_words = fits.view(np.uint64)
+    left = np.zeros((n + 1, n, words), np.uint64)
+    untried = np.zeros((n, words), np.uint64)
+    null_left = np.zeros(n, np.bool_)
+    faces = np.full(n, -1, np.int64)
+    nulls = np.zeros(n + 1, np.int64)
+    posed = np.full(n + 1, -1, np.int64)
+    turns = np.empty((n + 1, 3, 3))
+    shifts = np.empty((n + 1, 3))
+    angles = np.empty(n + 1)
+    rotation, translation = np.empty((3, 3)), np.empty(3)
+    work = workspace(n)
+    stack = box_stack(n)
+    row, near, root = np.empty(6), np.empty(3), np.empty((3, 3))
+    ball = work[6][1]
+    nodes = np.zeros(n, np.int64)
+    counts = np.zeros(6, np.int64)
+    found = 0
+    found_faces = np.empty((16, n), np.int32)
+    found_turns = np.empty((16, 3, 3))
+    found_shifts = np.empty((16, 3))
+    found_costs = np.empty(16)
+    found_informations = np.empty((16, 6, 6))
+    found_proven = np.empty(16, np.bool_)
+    everything = np.zeros(words, np.uint64)
+    for f in range(features):
+        everything[f >> 6] |= _ONE << np.uint64(f & 63)
+    for m in range(len(prefixes)):
+        for j in range(n):
+            left[start, j] = everything
+        if start == 0:
+            left[0, 0] = first_domain
+        nulls[start] = 0
+        for i in range(start):
+            f = prefixes[m, i]
+            faces[i] = f
+            if f < 0:
+                nulls[start] += 1
+                continue
+            for j in range(start, n):
+                if not known[i, j, f]:
+                    compatible(
+                        f,
+                        packed,
+                        half_angles[f],
+                        readings[i, j],
+                        errors[i],
+                        errors[j],
+                        switches,
+                        fits,
+                        fit_words,
+                        masks[i, j, f],
+                    )
+                    known[i, j, f] = True
+                for w in range(words):
+                    left[start, j, w] &= masks[i, j, f, w]
+        posed[start] = -1
+        level = start
+        untried[level] = left[level, level]
+        null_left[level] = nulls[level] < spare
+        while level >= start:
+            # The next feature of this contact, or none at all.
+            face = -1
+            for w in range(words):
+                bits = untried[level, w]
+                if bits != _NONE:
+                    lowest = bits & (~bits + _ONE)
+                    untried[level, w] = bits ^ lowest
+                    face = w * 64 + bit_index(lowest)
+                    break
+            if face < 0:
+                if not null_left[level]:
+                    level -= 1
+                    continue
+                null_left[level] = False
+            faces[level] = face
+            depth = level + 1
+            nulls[depth] = nulls[level] + (1 if face < 0 else 0)
+            if counts[NODES] == most_nodes or found == most_leaves:
+                counts[CUT] = 1
+                level = -1
+                break
+            counts[NODES] += 1
+            nodes[level] += 1
+            empty = 0
+            completions = 1.0
+            for j in range(depth, n):
+                if face >= 0 and not known[level, j, face]:
+                    compatible(
+                        face,
+                        packed,
+                        half_angles[face],
+                        readings[level, j],
+                        errors[level],
+                        errors[j],
+                        switches,
+                        fits,
+                        fit_words,
+                        masks[level, j, face],
+                    )
+                    known[level, j, face] = True
+                some = 0
+                for w in range(words):
+                    bits = left[level, j, w]
+                    if face >= 0:
+                        bits &= masks[level, j, face, w]
+                    left[depth, j, w] = bits
+                    some += count_bits(bits)
+                if some == 0:
+                    empty += 1
+                    if nulls[depth] + empty > spare:
+                        break
+                completions *= max(some, 1)
+            if nulls[depth] + empty > spare:
+                continue
+            posed[depth] = posed[level]
+            last = posed[depth]
+            leaf = depth == n
+            if not leaf and (depth < 3 or completions <= crowd):
+                level = depth
+                untried[level] = left[level, level]
+                null_left[level] = nulls[level] < spare
+                continue
+            # Where the pose can be: about that of a shorter branch, or as the normals have it.
+            if last >= 0:
+                rotation[:], translation[:] = turns[last], shifts[last]
+                angle = angles[last]
+            else:
+                angle = start_pose(
+                    depth, faces, contacts, model, half_angles, middles, rotation, translation
+                )
+                if angle < 0.0:
+                    continue
+            if not leaf:
+                if angle > VAGUE:
+                    level = depth
+                    untried[level] = left[level, level]
+                    null_left[level] = nulls[level] < spare
+                    continue
+                counts[VERDICTS] += 1
+                ball[:] = rotation
+                verdict, angle, _, _ = judge(
+                    depth,
+                    faces,
+                    faces,
+                    contacts,
+                    model,
+                    ball,
+                    angle,
+                    INNER_STEPS,
+                    rotation,
+                    translation,
+                    work,
+                )
+                if verdict != REJECTED:
+                    angle, _ = locate(
+                        depth, faces, faces, model, contacts, rotation, ball, angle, work
+                    )
+                if verdict == REJECTED or angle < 0.0:
+                    counts[INNER_REJECTED] += 1
+                    continue
+                posed[depth] = depth
+                turns[depth], shifts[depth], angles[depth] = rotation, translation, angle
+                square_root(work[1][0], root)
+                x, u, levers = work[3][0], work[3][1], work[3][2]
+                pivot = work[5][2]
+                empty = 0
+                carry(n, points, contacts[1], rotation, translation, x, u)
+                for j in range(depth, n):
+                    some = False
+                    for k in range(3):
+                        levers[j, k] = x[j, k] - pivot[k]
+                    for w in range(words):
+                        bits = left[depth, j, w]
+                        kept = bits
+                        while bits != _NONE:
+                            lowest = bits & (~bits + _ONE)
+                            bits ^= lowest
+                            if not possible(
+                                x[j],
+                                u[j],
+                                levers[j],
+                                w * 64 + bit_index(lowest),
+                                contacts[2][j],
+                                contacts[3][j],
+                                contacts[4][j],
+                                model,
+                                angle,
+                                work[1],
+                                root,
+                                row,
+                                near,
+                            ):
+                                kept ^= lowest
+                        left[depth, j, w] = kept
+                        some |= kept != _NONE
+                    if not some:
+                        empty += 1
+                        if nulls[depth] + empty > spare:
+                            break
+                if nulls[depth] + empty > spare:
+                    counts[INNER_REJECTED] += 1
+                    continue
+                level = depth
+                untried[level] = left[level, level]
+                null_left[level] = nulls[level] < spare
+                continue
+            counts[LEAVES_TRIED] += 1
+            verdict, looked = settle(
+                n,
+                faces,
+                contacts,
+                model,
+                angle,
+                min(most_boxes, pool),
+                rotation,
+                translation,
+                work,
+                stack,
+            )
+            pool -= looked
+            counts[BOXES] += looked
+            if verdict == REJECTED:
+                continue
+            if found == len(found_costs):
+                found_faces = _larger(found_faces, 2 * found)
+                found_turns = _larger(found_turns, 2 * found)
+                found_shifts = _larger(found_shifts, 2 * found)
+                found_costs = _larger(found_costs, 2 * found)
+                found_informations = _larger(found_informations, 2 * found)
+                found_proven = _larger(found_proven, 2 * found)
+            found_costs[found] = finish(
+                n, faces, contacts, model, rotation, translation, work, found_informations[found]
+            )
+            found_faces[found] = faces
+            found_turns[found] = rotation
+            found_shifts[found] = translation
+            found_proven[found] = verdict == FEASIBLE
+            found += 1
+        if counts[CUT]:
+            break
+    return (
+        found_faces[:found],
+        found_turns[:found],
+        found_shifts[:found],
+        found_costs[:found],
+        found_informations[:found],
+        found_proven[:found],
+        nodes,
+        counts,
+    )

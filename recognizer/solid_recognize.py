@@ -1,0 +1,235 @@
+"""Recognition in space, for one solid: contacts in, weighted hypotheses out.
+
+Six degrees of freedom (memo, Section 4.2 on). The tree and the model test run as one compiled
+search, see `search_kernels`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from time import perf_counter
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import RigidTransform
+
+from . import search_kernels
+from .belief import Search
+from .contacts import Contacts
+from .features import Features, all_features, face_features
+from .hypotheses import Hypothesis, PoseTolerance, cluster
+from .pose import ModelTest, Poses, kernel_contacts
+from .ranges import PairTables, pack_tables
+from .symmetry import feature_permutations
+from .table_cache import cached_tables
+from .tree import Constraints
+
+if TYPE_CHECKING:
+    from .polyhedron import Polyhedron
+    from .recognize import SearchLimits
+
+EXACT_SYMMETRY = 1e-7
+"""How far a symmetry may miss, as a share of the smallest bound on a position, to stand for a part
+of the search: what it misses is then below what a witness may miss a bound by."""
+
+Roots = tuple[NDArray[np.uint64], NDArray[np.uint64]]
+
+
+@dataclass(frozen=True, eq=False)
+class SolidEntry:
+    """A solid of a library, with all that is built of it once."""
+
+    model: Polyhedron
+    features: Features
+    tables: PairTables
+    test: ModelTest
+    packed: NDArray[np.float64]
+    """The tables as the kernels read them."""
+
+    @classmethod
+    def of(cls, model: Polyhedron, *, edges: bool, cache: Path | None) -> SolidEntry:
+        """Build tables and test of a solid.
+
+        Args:
+            model: the solid.
+            edges: whether contacts may lie on edges and vertices too.
+            cache: a folder to keep tables in; none, and they are built anew.
+        """
+        features = all_features(model) if edges else face_features(model)
+        tables = (
+            PairTables.of(model, features)
+            if cache is None
+            else cached_tables(model, cache, features=features if edges else None)
+        )
+        return cls(model, features, tables, ModelTest(model, features), pack_tables(tables))
+
+    @cached_property
+    def permutations(self) -> tuple[NDArray[np.int32], float]:
+        """(g, f) where each symmetry of the solid takes each feature, and by how much it misses."""
+        return feature_permutations(self.model, self.features)
+
+    @cached_property
+    def roots(self) -> Roots:
+        """Bit sets of all features, and of one of each orbit under the symmetries."""
+        count = len(self.features)
+        return _bits(np.arange(count), count), _bits(
+            np.unique(self.permutations[0].min(axis=0)), count
+        )
+
+
+def search_solid(
+    entry: SolidEntry,
+    contacts: Contacts,
+    constraints: Constraints,
+    tolerance: PoseTolerance,
+    limits: SearchLimits,
+    *,
+    outliers: int = 0,
+    prefixes: NDArray[np.int32] | None = None,
+) -> tuple[list[Hypothesis], NDArray[np.float64], Search]:
+    """The search and its groups of poses, for one solid.
+
+    Args:
+        entry: the solid.
+        contacts: at least one contact, in the order of the search.
+        constraints: which constraints on pairs prune the tree.
+        tolerance: which poses count as the same.
+        limits: how far the search goes.
+        outliers: how many contacts may lie on no feature.
+        prefixes: (m, k) all interpretations of the first k contacts, if known.
+
+    Returns:
+        Hypotheses; (h,) the logarithms of their weights, not yet normalised; and what was done.
+    """
+    started = perf_counter()
+    smallest = float(contacts.position_error.min())
+    everything, orbits = entry.roots
+    permutations, missed = entry.permutations
+    symmetric = (
+        prefixes is None and len(permutations) > 1 and missed < EXACT_SYMMETRY * smallest
+        and outliers == 0
+    )
+    poses, nodes, counts = _search(
+        entry,
+        contacts,
+        constraints,
+        limits,
+        outliers,
+        np.zeros((1, 0), np.int32) if prefixes is None else prefixes,
+        orbits if symmetric else everything,
+    )
+    if symmetric:
+        poses = _spread_over_symmetries(entry.model, poses, permutations)
+    searched = perf_counter()
+    largest = float(contacts.position_error.max())
+    hypotheses, log_weights = cluster(entry.model, poses, tolerance, largest)
+    search = Search(
+        object_name=entry.model.name,
+        nodes=nodes,
+        pruned=int(counts[search_kernels.LEAVES_TRIED]) * (len(permutations) if symmetric else 1),
+        tested=len(poses),
+        hypotheses=len(hypotheses),
+        complete=not counts[search_kernels.CUT],
+        boxes=int(counts[search_kernels.BOXES]),
+        search_seconds=searched - started,
+        cluster_seconds=perf_counter() - searched,
+    )
+    return hypotheses, log_weights, search
+
+
+def _search(
+    entry: SolidEntry,
+    contacts: Contacts,
+    constraints: Constraints,
+    limits: SearchLimits,
+    outliers: int,
+    prefixes: NDArray[np.int32],
+    root: NDArray[np.uint64],
+) -> tuple[Poses, NDArray[np.int64], NDArray[np.int64]]:
+    test = entry.test
+    *found, nodes, counts = search_kernels.search_model(
+        kernel_contacts(contacts),
+        contacts.normal_error,
+        test.model,
+        entry.features.half_angles,
+        test.middles,
+        entry.packed,
+        prefixes,
+        root,
+        outliers,
+        constraints.bits,
+        float(limits.crowd),
+        limits.nodes,
+        limits.budget,
+        test.boxes,
+        test.pool,
+    )
+    return Poses(*found), nodes, counts
+
+
+def _spread_over_symmetries(
+    model: Polyhedron, poses: Poses, permutations: NDArray[np.int32]
+) -> Poses:
+    """Each interpretation as seen from every symmetry of the solid, with its pose."""
+    if not len(poses):
+        return poses
+    count, found = len(permutations), len(poses)
+    faces = permutations[:, poses.faces].reshape(count * found, -1)
+    faces, rows = np.unique(faces, axis=0, return_index=True)
+    which, of = np.divmod(rows, found)
+    turns = model.symmetries[which]
+    rotations = poses.rotations[of] @ turns.transpose(0, 2, 1)
+    centres = poses.translations[of] + poses.rotations[of] @ model.centroid
+    # A motion in the object's frame turns along.
+    frames = np.zeros((len(of), 6, 6))
+    frames[:, :3, :3] = frames[:, 3:, 3:] = turns
+    informations = frames @ poses.informations[of] @ frames.transpose(0, 2, 1)
+    return Poses(
+        np.ascontiguousarray(faces, np.int32),
+        rotations,
+        centres - rotations @ model.centroid,
+        poses.costs[of],
+        informations,
+        poses.proven[of],
+    )
+
+
+def span_solid(
+    entry: SolidEntry,
+    hypothesis: Hypothesis,
+    contacts: Contacts,
+    tolerance: PoseTolerance,
+    most: int,
+) -> RigidTransform:
+    """Poses that span a hypothesis: its own and, along the freedoms it leaves open, others.
+
+    Neighbours are half a pose tolerance apart, over the family that the hypothesis's best
+    interpretation allows, outwards from its own pose as far as ``most`` reach.
+
+    Args:
+        entry: the solid that the hypothesis is of.
+        hypothesis: of a belief about these contacts.
+        contacts: what was felt.
+        tolerance: which poses count as the same.
+        most: the most poses.
+
+    Returns:
+        A stack of poses, model to world, the hypothesis's own first.
+    """
+    if hypothesis.determined:
+        return RigidTransform.from_matrix(hypothesis.pose.as_matrix()[None])
+    largest = float(contacts.position_error.max())
+    diameter = entry.model.diameter
+    step = 0.5 * min(tolerance.distance(diameter, largest), tolerance.rotation * diameter / 2.0)
+    faces = hypothesis.interpretations[0]
+    return entry.test.span(faces, contacts, hypothesis.pose, hypothesis.freedoms, step, most)
+
+
+def _bits(members: NDArray[np.integer], count: int) -> NDArray[np.uint64]:
+    bits = np.zeros(-(-count // 64), np.uint64)
+    members = members.astype(np.uint64)
+    np.bitwise_or.at(bits, members >> np.uint64(6), np.uint64(1) << (members & np.uint64(63)))
+    return bits

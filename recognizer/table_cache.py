@@ -1,0 +1,182 @@
+"""Range tables kept on disk, so that a library is prepared once and not once a process.
+
+A file is named by a hash of all that its tables depend on, so a changed model or a changed way of
+building tables never meets an old file. It holds a header and the raw arrays, under a checksum:
+whatever isn't whole, be it cut off, damaged or of another kind, is built anew.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+import json
+import os
+import tempfile
+import warnings
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import fields, is_dataclass
+from functools import cache
+from math import prod
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import features as features_module
+from . import range_kernels, ranges
+from .features import Features
+from .polyhedron import Polyhedron
+from .ranges import PairTables
+
+MAGIC = b"palpate tables 1\n"
+"""What a file starts with; the number is that of the layout in `_pack`."""
+BUILDERS = (features_module, range_kernels, ranges)
+"""The modules that tables are built by. Their text is part of a file's name."""
+ALIGNMENT = 16
+"""Arrays start at multiples of this many bytes, as Python lays out what it reads."""
+CHECKSUM_BYTES = 16
+LENGTH_BYTES = 8
+
+Array = NDArray[Any]
+
+
+def cached_tables(
+    model: Polyhedron, folder: Path | None = None, *, features: Features | None = None
+) -> PairTables:
+    """The range tables of a model: read if they have been built before, built and kept if not.
+
+    Safe with other processes at work on the same folder. A folder that can't be written is said
+    once, as a warning; the tables are then built each time.
+
+    Args:
+        model: the object; its name doesn't matter.
+        folder: where the files are; by default the user's cache folder.
+        features: what the tables are over, as `PairTables.of` takes them; by default the faces.
+
+    Returns:
+        Tables whose arrays are read-only, and no part of the model.
+    """
+    folder = default_folder() if folder is None else folder
+    path = None if folder is None else folder / f"{table_key(model, features)}.tables"
+    tables = None if path is None else _read(path)
+    if tables is not None:
+        return tables
+    content = _pack(PairTables.of(model, features))
+    if path is not None:
+        try:
+            _write(path, content)
+        except OSError as error:
+            _warn_of(str(folder), error.strerror or type(error).__name__)
+    return _unpack(content)
+
+
+def default_folder() -> Path | None:
+    """The folder for tables in the platform's cache; None if the user has no such place."""
+    from platformdirs import user_cache_path
+
+    folder = user_cache_path("palpate", appauthor=False) / "tables"
+    # Without a home directory the path comes back with its tilde, relative to wherever we are.
+    return folder if folder.is_absolute() else None
+
+
+def table_key(model: Polyhedron, features: Features | None = None) -> str:
+    """A hash, in hexadecimal, of everything that a model's tables depend on."""
+    digest = hashlib.blake2b(_builders(), digest_size=20)
+    given = [] if features is None else _arrays(features, "features.")
+    for name, array in (*_arrays(model), *given):
+        # Types and shapes too, so that no two lists of arrays have the same bytes.
+        digest.update(f"{name} {array.dtype.str} {array.shape};".encode())
+        digest.update(np.ascontiguousarray(array).data)
+    return digest.hexdigest()
+
+
+@cache
+def _builders() -> bytes:
+    names = ",".join(field.name for field in fields(PairTables))
+    sources = "".join(inspect.getsource(module) for module in BUILDERS)
+    return MAGIC + names.encode() + sources.encode()
+
+
+def _arrays(value: Any, prefix: str = "") -> Iterator[tuple[str, Array]]:
+    """All arrays of a dataclass and of the dataclasses in it, each under its dotted name."""
+    for field in fields(value):
+        part, name = getattr(value, field.name), prefix + field.name
+        if is_dataclass(part):
+            yield from _arrays(part, f"{name}.")
+        elif isinstance(part, np.ndarray):
+            yield name, part
+
+
+def _write(path: Path, content: bytes) -> None:
+    """Write under a name of its own, then rename: no reader ever sees half a file.
+
+    Raises:
+        OSError: the folder can't be made or written.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=path.stem, suffix=".part")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            file.write(content)
+        os.replace(temporary, path)
+    except BaseException:
+        with suppress(OSError):
+            os.unlink(temporary)
+        raise
+
+
+def _pack(tables: PairTables) -> bytes:
+    """Magic, checksum, length of the header; then what the checksum is of: header and arrays."""
+    layout, blocks, end = [], [], 0
+    for field in (field for field in fields(tables) if field.init):
+        array = np.ascontiguousarray(getattr(tables, field.name))
+        blocks.append(b"\0" * (-end % ALIGNMENT) + array.tobytes())
+        layout.append([field.name, array.dtype.str, array.shape, end + -end % ALIGNMENT])
+        end += len(blocks[-1])
+    header = json.dumps(layout).encode()
+    before = len(MAGIC) + CHECKSUM_BYTES + LENGTH_BYTES
+    header += b" " * (-(before + len(header)) % ALIGNMENT)
+    body = b"".join([len(header).to_bytes(LENGTH_BYTES, "little"), header, *blocks])
+    return MAGIC + _checksum(body) + body
+
+
+def _read(path: Path) -> PairTables | None:
+    """The tables in a file; None if there is none, or it isn't whole."""
+    try:
+        content = path.read_bytes()
+    except OSError:
+        return None
+    start = len(MAGIC) + CHECKSUM_BYTES
+    whole = content.startswith(MAGIC) and (
+        content[len(MAGIC) : start] == _checksum(memoryview(content)[start:])
+    )
+    return _unpack(content) if whole else None
+
+
+def _unpack(content: bytes) -> PairTables:
+    """The tables in a whole file's content."""
+    body = memoryview(content)[len(MAGIC) + CHECKSUM_BYTES :]
+    arrays_at = LENGTH_BYTES + int.from_bytes(body[:LENGTH_BYTES], "little")
+    layout = json.loads(bytes(body[LENGTH_BYTES:arrays_at]))
+    # Arrays over bytes, which never change, are read-only.
+    arrays: dict[str, Array] = {
+        name: np.frombuffer(body, dtype, prod(shape), arrays_at + at).reshape(shape)
+        for name, dtype, shape, at in layout
+    }
+    return PairTables(**arrays)
+
+
+def _checksum(body: bytes | memoryview) -> bytes:
+    return hashlib.blake2b(body, digest_size=CHECKSUM_BYTES).digest()
+
+
+@cache
+def _warn_of(folder: str, reason: str) -> None:
+    """Warn once a process and folder, however many models there are."""
+    warnings.warn(
+        f"{folder}: range tables can't be kept here ({reason}), so they are built each time",
+        UserWarning,
+        stacklevel=3,
+    )
