@@ -76,7 +76,18 @@ def settle(count, faces, contacts, model, angle, most, rotation, translation, wo
     ball = work[6][1]
     ball[:] = rotation
     verdict, angle, _, _ = judge(
-        count, faces, faces, contacts, model, ball, angle, LEAF_STEPS, rotation, translation, work
+        count,
+        faces,
+        faces,
+        contacts,
+        model,
+        ball,
+        angle,
+        LEAF_STEPS,
+        False,
+        rotation,
+        translation,
+        work,
     )
     if verdict == REJECTED or verdict == FEASIBLE:
         return verdict, 0

@@ -16,9 +16,9 @@ from numba import njit
 from .polygon_kernels import INSIDE
 from .reading_kernels import RAY
 
-ROUNDS = 10
+ROUNDS = 5
 SHRINKS = 0.9
-PATIENCE = 3
+PATIENCE = 2
 """Rounds go on until so many in a row have not shrunk the region below this share of its size."""
 
 

@@ -242,6 +242,7 @@ def search_model(
                     ball,
                     angle,
                     INNER_STEPS,
+                    False,
                     rotation,
                     translation,
                     work,

@@ -18,10 +18,19 @@ from .reading_kernels import carry, read, worst_on_pieces
 from .verdict_kernels import BESIDE, EXACT, FEASIBLE, REJECTED, UNDECIDED, judge
 
 STACK = 512
-STEPS = 4
+STEPS = 2
 """Steps of a verdict on a box."""
 FINEST = 1e-3
 """Half a box (radians) that isn't cut further: its poses are alike beyond any bound."""
+SEEK = 16
+"""Once in so many boxes the interior-point method has its try, ..."""
+NEARLY = 1.2
+"""... and where the largest reading, in bounds, is below this, ..."""
+FINE = 0.05
+"""... and in boxes of half a diagonal (radians) below this: then proofs need better weights than a
+few steps of a verdict find. Elsewhere it is slow, and settles little that smaller boxes don't."""
+FLOOR = 0.02
+"""What a weight starts with again in every box."""
 WORTHWHILE = 0.3
 """A region is cut instead of the box it came from, if its volume is below this share of it."""
 
@@ -71,8 +80,8 @@ def search_poses(count, faces, contacts, model, angle, most, rotation, translati
     """
     first = model[2]
     readings, region = work[0], work[1]
-    x, u, _, _ = work[3]
-    turns, shifts, axes, centres, halves, targets = stack
+    x, u, _, weights = work[3]
+    turns, shifts, axes, centres, halves, targets, kept = stack
     held = np.empty(3)
     ball = np.empty((3, 3))
     turned, shifted = np.empty((3, 3)), np.empty(3)
@@ -121,6 +130,8 @@ def search_poses(count, faces, contacts, model, angle, most, rotation, translati
         box_angle = min(diagonal, np.pi)
         ball[:] = rotation
         chosen = targets[top, :count].copy()
+        # Their mean is about 1; none may vanish for good.
+        weights[:count] = kept[top, :count] + FLOOR
         outcome, bound, worst, where = judge(
             count,
             faces,
@@ -130,6 +141,7 @@ def search_poses(count, faces, contacts, model, angle, most, rotation, translati
             ball,
             box_angle,
             STEPS,
+            looked > 0,
             rotation,
             translation,
             work,
@@ -143,7 +155,10 @@ def search_poses(count, faces, contacts, model, angle, most, rotation, translati
             least = worst
             best_turn[:], best_shift[:] = rotation, translation
         small = diagonal < FINEST
-        if outcome == UNDECIDED:
+        kept[top, :count] = weights[:count]
+        if outcome == UNDECIDED and (
+            diagonal < FINE or looked % SEEK == 0 or worst < NEARLY
+        ):
             turned[:], shifted[:] = rotation, translation
             outcome = seek_feasible(
                 count, faces, chosen, contacts, model, 60, True, ball, bound, turned, shifted, work
@@ -164,8 +179,10 @@ def search_poses(count, faces, contacts, model, angle, most, rotation, translati
                 height = top
                 continue
             else:
+                # The region is to be about the verdict's pose again.
                 carry(count, contacts[0], contacts[1], rotation, translation, x, u)
                 read(count, faces, chosen, x, u, model, contacts, readings)
+                weights[:count] = kept[top, :count]
                 locate(count, faces, chosen, model, contacts, rotation, ball, bound, work)
         if outcome == BESIDE:
             # Every bound is met on the hulls, but this contact is beside its concave face.
@@ -179,6 +196,7 @@ def search_poses(count, faces, contacts, model, angle, most, rotation, translati
                 halves[height] = halves[top]
                 targets[height, :count] = chosen
                 targets[height, where] = p
+                kept[height, :count] = weights[:count]
                 height += 1
             continue
         if height == STACK:
@@ -196,6 +214,8 @@ def search_poses(count, faces, contacts, model, angle, most, rotation, translati
         axes[height], centres[height] = axes[top], centres[top]
         halves[height] = halves[top]
         targets[height, :count] = chosen
+        kept[top, :count] = weights[:count]
+        kept[height, :count] = weights[:count]
         centres[top, longest] -= halves[top, longest]
         centres[height, longest] += halves[top, longest]
         height += 1
@@ -205,7 +225,7 @@ def search_poses(count, faces, contacts, model, angle, most, rotation, translati
 
 @njit(cache=True)
 def box_stack(count):
-    """A stack of boxes for `search_poses`: poses, axes, centres, half sides, polygons."""
+    """A stack of boxes for `search_poses`: poses, axes, centres, half sides, polygons, weights."""
     return (
         np.empty((STACK, 3, 3)),
         np.empty((STACK, 3)),
@@ -213,4 +233,5 @@ def box_stack(count):
         np.empty((STACK, 3)),
         np.empty((STACK, 3)),
         np.empty((STACK, count), np.int64),
+        np.empty((STACK, count, 2)),
     )

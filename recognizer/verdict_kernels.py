@@ -48,7 +48,7 @@ def _raise_weights(count, faces, contacts, readings, weights):
 
 @njit(cache=True)
 def judge(
-    count, faces, targets, contacts, model, ball, angle, most, rotation, translation, work
+    count, faces, targets, contacts, model, ball, angle, most, warm, rotation, translation, work
 ):
     """Judge an interpretation of the first contacts from a starting pose.
 
@@ -62,6 +62,8 @@ def judge(
             than ...
         angle: ... this angle, radians. A smaller ball that comes to light replaces it in place.
         most: the most steps once settled.
+        warm: whether the weights in the work space are to be used, and nothing settled: those of
+            a verdict on much the same poses.
         rotation: (3, 3) object to world, moved in place.
         translation: (3,) likewise.
         work: see `workspace`.
@@ -75,11 +77,10 @@ def judge(
     _, step, pivot, shifted = vectors
     turned = frames[0]
     centre = region[2]
-    settled = 0
+    settled = SETTLING if warm else 0
     taken = 0
-    for i in range(count):
-        weights[i, 0] = 1.0
-        weights[i, 1] = 1.0
+    if not warm:
+        weights[:count] = 1.0
     while True:
         carry(count, points, measured, rotation, translation, x, u)
         worst = read(count, faces, targets, x, u, model, contacts, readings)

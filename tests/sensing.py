@@ -5,16 +5,35 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import oracles
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from palpate.envs.noise import uniform_in_ball, uniform_in_cone
 from palpate.recognizer import Contacts, Polyhedron
+from palpate.recognizer.features import Features
 from palpate.recognizer.rays import cast_rays
 
 INCH = 0.0254
 
 Floats = NDArray[np.float64]
+
+CUBE = Polyhedron.from_mesh(oracles.box(0.04, 0.04, 0.04), name="cube")
+L_BLOCK = Polyhedron.from_mesh(
+    oracles.blocks([[[1], [1]], [[1], [0]]], [0, 0.02, 0.06], [0, 0.02, 0.05], [0, 0.03]),
+    name="L-block",
+)
+HOLED = Polyhedron.from_mesh(
+    oracles.blocks(
+        [[[1], [1], [1]], [[1], [0], [1]], [[1], [1], [1]]],
+        [0, 0.02, 0.06, 0.08],
+        [0, 0.015, 0.045, 0.06],
+        [0, 0.025],
+    ),
+    name="holed",
+)
+SMALL = {model.name: model for model in (CUBE, L_BLOCK, HOLED)}
+"""Solids of a few faces: all of them alike, two of them concave, two of them with a hole."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,17 +100,47 @@ def touch_faces(
     pose = random_pose(rng) if T_world_object is None else T_world_object
     points = np.empty((len(faces), 3))
     for row, face in enumerate(faces):
-        triangles = model.vertices[model.triangles[model.triangle_faces == face]]
-        sides = triangles[:, 1:] - triangles[:, :1]
-        areas = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
-        chosen = rng.choice(len(triangles), p=areas / areas.sum())
-        points[row] = rng.dirichlet(np.ones(3)) @ triangles[chosen]
+        points[row] = _point_on(model, face, rng)
     return Touches(
         pose,
         pose.apply(points),
         pose.rotation.apply(model.normals[faces]),
         np.array(faces, np.int32),
     )
+
+
+def _point_on(model: Polyhedron, face: int, rng: np.random.Generator) -> Floats:
+    triangles = model.vertices[model.triangles[model.triangle_faces == face]]
+    sides = triangles[:, 1:] - triangles[:, :1]
+    areas = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
+    return rng.dirichlet(np.ones(3)) @ triangles[rng.choice(len(triangles), p=areas / areas.sum())]
+
+
+def touch_features(
+    model: Polyhedron, features: Features, rng: np.random.Generator, count: int
+) -> Touches:
+    """Touch faces, edges and vertices, as many of each, anywhere on them, at a random pose.
+
+    The normal on an edge or a vertex is any of its cone, an end of it every so often.
+    """
+    starts = np.array([0, model.face_count, model.face_count + features.edge_count, len(features)])
+    kinds = rng.choice(np.flatnonzero(np.diff(starts)), count)
+    chosen = rng.integers(starts[kinds], starts[kinds + 1])
+    points, normals = np.empty((count, 3)), np.empty((count, 3))
+    for row, feature in enumerate(map(int, chosen)):
+        start, first = features.start, features.cone_start
+        corners = features.corners[start[feature] : start[feature + 1]]
+        points[row] = _within(corners, rng) if kinds[row] else _point_on(model, feature, rng)
+        normals[row] = _within(features.cone_normals[first[feature] : first[feature + 1]], rng)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    pose = random_pose(rng)
+    return Touches(pose, pose.apply(points), pose.rotation.apply(normals), chosen.astype(np.int32))
+
+
+def _within(corners: Floats, rng: np.random.Generator) -> Floats:
+    if rng.random() < 0.2:
+        return corners[rng.integers(len(corners))]
+    return rng.dirichlet(np.ones(len(corners))) @ corners
 
 
 def feel(
@@ -101,8 +150,12 @@ def feel(
     normal_error: float,
     *,
     at_bounds: bool = False,
+    alike: bool = False,
 ) -> Contacts:
-    """Contacts with noise uniform in their bounds or, ``at_bounds``, as far out as they may be."""
+    """Contacts with noise uniform in their bounds or, ``at_bounds``, as far out as they may be.
+
+    With ``alike`` all normals are turned alike: as the object itself might be, for all they say.
+    """
     count = len(touches)
     shifts = uniform_in_ball(rng, count, position_error)
     normals = uniform_in_cone(rng, touches.normals, normal_error)
@@ -113,11 +166,25 @@ def feel(
         tangents /= np.linalg.norm(tangents, axis=1, keepdims=True)
         edge = normal_error - 1e-9
         normals = np.cos(edge) * touches.normals + np.sin(edge) * tangents
+    if alike:
+        axis = rng.normal(size=3)
+        turn = (normal_error - 1e-9) * axis / np.linalg.norm(axis)
+        normals = Rotation.from_rotvec(turn).apply(touches.normals)
     return Contacts(
         touches.points + shifts,
         normals,
         position_error=position_error,
         normal_error=normal_error,
+    )
+
+
+def forget_normals(contacts: Contacts, forgotten: NDArray[np.bool_]) -> Contacts:
+    """The same contacts, some of their normals unknown."""
+    return Contacts(
+        contacts.positions,
+        np.where(forgotten[:, None], np.nan, contacts.normals),
+        position_error=contacts.position_error,
+        normal_error=contacts.normal_error,
     )
 
 
