@@ -15,9 +15,12 @@ COLUMNS = 11
 """Rows of `pack_tables` a feature."""
 
 _ONE = np.uint64(1)
-_BYTES = np.uint64(0x0101010101010101)
-_GATHER = np.uint64(0x0102040810204080)
-_TOP = np.uint64(56)
+_NONE = np.uint64(0)
+_DE_BRUIJN = np.uint64(0x03F79D71B4CB0A89)
+"""All six-bit patterns occur in it once, so that shifting it by a place names the place."""
+_PLACES = np.array(
+    [(0x03F79D71B4CB0A89 << place & (1 << 64) - 1) >> 58 for place in range(64)]
+).argsort()
 
 
 @njit(cache=True)
@@ -32,14 +35,23 @@ def _angle_between(u, v):
 
 
 @njit(cache=True)
+def _component_range(length, omega, error, reach):
+    # The true normal lies in a cone around the measured one, so its component of the vector runs
+    # from cos(omega + alpha) to cos(omega - alpha), clamped to [0, pi].
+    least = length * np.cos(min(np.pi, omega + error)) - reach
+    return least, length * np.cos(max(0.0, omega - error)) + reach
+
+
+@njit(cache=True)
 def pair_readings(contacts, errors, readings):
     """What two contacts show of each other, for i < j.
 
     Args:
         contacts: see `search_kernels.search_model`.
         errors: (n,) bounds on normals, radians.
-        readings: (n, n, 5) written in place: distance, angle between the normals, angles of the
-            vector between the contacts against either normal, and the bound on the distance.
+        readings: (n, n, 9) written in place: distance, angle between the normals, angles of the
+            vector between the contacts against either normal, and the bound on the distance; least
+            and greatest component of the vector along the first's true normal, and the second's.
     """
     points, normals, reaches = contacts[0], contacts[1], contacts[2]
     for j in range(len(points)):
@@ -57,90 +69,82 @@ def pair_readings(contacts, errors, readings):
                 row[3] = _angle_between(normals[j], -d)
             # Each end of the vector is off by its own bound at most (memo's 2-delta).
             row[4] = reaches[i] + reaches[j]
+            for side in range(2):
+                error = errors[i] if side == 0 else errors[j]
+                low, high = _component_range(length, row[2 + side], error, row[4])
+                row[5 + 2 * side], row[6 + 2 * side] = low, high
 
 
 @njit(cache=True)
-def compatible(a, packed, half_angle, reading, error_i, error_j, switches, fits, words, row):
-    """Which features contact j can be on if contact i is on ``a``.
+def narrow(a, packed, half_angle, reading, error_i, error_j, switches, domain, kept):
+    """Which features of a set contact j can be on if contact i is on ``a``.
+
+    Checked anew on every branch: after a level or two the sets are so small that looking up rows
+    made for all features would cost more.
 
     Args:
         a: the feature of contact i.
         packed: (f, `COLUMNS`, f) see `ranges.pack_tables`.
         half_angle: how far a's normals lean from its middle one, radians.
-        reading: (5,) see `pair_readings`.
+        reading: (9,) see `pair_readings`.
         error_i: bound on contact i's normal, radians.
         error_j: bound on contact j's.
         switches: bits, which constraints to apply.
-        fits: (64 w,) bytes, zero beyond the features; work space.
-        words: (8 w,) the same bytes as 64-bit words.
-        row: (w,) bit set, written in place.
+        domain: (w,) bit set.
+        kept: (w,) bit set, written in place.
+
+    Returns:
+        How many features are kept.
     """
-    length, gamma, omega_i, omega_j, reach = reading
-    table = packed[a]
-    count = packed.shape[2]
-    near, far = table[0], table[1]
-    narrow, broad = table[2], table[3]
-    low_i, high_i, low_j, high_j = table[4], table[5], table[6], table[7]
+    length, gamma, reach = reading[0], reading[1], reading[4]
     inf = np.inf
-    least_d, most_d = (length - reach, length + reach) if switches & DISTANCE else (-inf, inf)
-    both = error_i + error_j + 1e-9
-    least_g, most_g = (gamma - both, gamma + both) if switches & ANGLE else (-inf, inf)
+    least_d, most_d, least_g, most_g = -inf, inf, -inf, inf
     least_i, most_i, least_j, most_j = -inf, inf, -inf, inf
+    if switches & DISTANCE:
+        least_d, most_d = length - reach, length + reach
+    if switches & ANGLE:
+        both = error_i + error_j + 1e-9
+        least_g, most_g = gamma - both, gamma + both
     if switches & COMPONENT:
-        # The true normal lies in a cone around the measured one, so its component of the vector
-        # runs from cos(omega + alpha) to cos(omega - alpha), clamped to [0, pi].
-        cone = error_i + half_angle
-        least_i = length * np.cos(min(np.pi, omega_i + cone)) - reach
-        most_i = length * np.cos(max(0.0, omega_i - cone)) + reach
-        least_j = length * np.cos(min(np.pi, omega_j + error_j)) - reach
-        most_j = length * np.cos(max(0.0, omega_j - error_j)) + reach
-    for b in range(count):
-        fits[b] = (
-            (near[b] <= most_d)
-            & (far[b] >= least_d)
-            & (narrow[b] <= most_g)
-            & (broad[b] >= least_g)
-            & (low_i[b] <= most_i)
-            & (high_i[b] >= least_i)
-            & (low_j[b] <= most_j)
-            & (high_j[b] >= least_j)
-        )
+        least_i, most_i, least_j, most_j = reading[5], reading[6], reading[7], reading[8]
+        if half_angle > 0.0:
+            least_i, most_i = _component_range(length, reading[2], error_i + half_angle, reach)
+    # The true vector may point anywhere within asin(reach / length) of the measured one.
+    bend_i, bend_j = 0.0, 0.0
     if switches & TILT:
-        # The true vector may point anywhere within asin(reach / length) of the measured one.
         swing = np.arcsin(reach / length) if length > reach else np.pi
         bend_i, bend_j = error_i + half_angle + swing, error_j + swing
-        for b in range(count):
-            fits[b] &= (
-                (table[8, b] <= omega_i + bend_i)
-                & (table[9, b] >= omega_i - bend_i)
-                & (packed[b, 8, a] <= omega_j + bend_j + table[10, b])
-                & (packed[b, 9, a] >= omega_j - bend_j - table[10, b])
-            )
-    for w in range(len(row)):
-        bits = np.uint64(0)
-        for k in range(8):
-            # Eight bytes of 0 or 1 become eight bits: none of the products overlap.
-            byte = ((words[8 * w + k] & _BYTES) * _GATHER) >> _TOP
-            bits |= byte << np.uint64(8 * k)
-        row[w] = bits
-
-
-@njit(cache=True)
-def count_bits(bits):
-    """How many bits of a word are set."""
-    found = 0
-    while bits != np.uint64(0):
-        bits &= bits - _ONE
-        found += 1
-    return found
+    count = 0
+    for w in range(len(domain)):
+        bits = domain[w]
+        found = _NONE
+        while bits != _NONE:
+            lowest = bits & (~bits + _ONE)
+            bits ^= lowest
+            b = 64 * w + bit_index(lowest)
+            # The angle first: it rules out most.
+            if packed[a, 2, b] > most_g or packed[a, 3, b] < least_g:
+                continue
+            if packed[a, 4, b] > most_i or packed[a, 5, b] < least_i:
+                continue
+            if packed[a, 6, b] > most_j or packed[a, 7, b] < least_j:
+                continue
+            if packed[a, 0, b] > most_d or packed[a, 1, b] < least_d:
+                continue
+            if switches & TILT and (
+                packed[a, 8, b] > reading[2] + bend_i
+                or packed[a, 9, b] < reading[2] - bend_i
+                or packed[b, 8, a] > reading[3] + bend_j + packed[a, 10, b]
+                or packed[b, 9, a] < reading[3] - bend_j - packed[a, 10, b]
+            ):
+                continue
+            found |= lowest
+            count += 1
+        kept[w] = found
+    return count
 
 
 @njit(cache=True)
 def bit_index(single):
     """The place of the only bit set in a word."""
-    index = 0
-    for step in (32, 16, 8, 4, 2, 1):
-        if single >> np.uint64(step) != np.uint64(0):
-            single >>= np.uint64(step)
-            index += step
-    return index
+    return int(_PLACES[(single * _DE_BRUIJN) >> np.uint64(58)])

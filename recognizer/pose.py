@@ -84,8 +84,8 @@ class ModelTest:
         model: Polyhedron,
         features: Features | None = None,
         *,
-        boxes: int = 5_000,
-        pool: int = 500_000,
+        boxes: int = 2_000,
+        pool: int = 100_000,
     ) -> None:
         """Prepare a model.
 
@@ -94,7 +94,7 @@ class ModelTest:
             features: what of it contacts may lie on; its faces by default.
             boxes: boxes of rotations to look at before an interpretation is left undecided.
             pool: the same for all interpretations of one call together; a thousand take about
-                ten milliseconds.
+                fifty milliseconds.
         """
         self.boxes, self.pool = boxes, pool
         self.features = features = features or face_features(model)

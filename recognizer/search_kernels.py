@@ -12,7 +12,7 @@ import numpy as np
 from numba import njit
 
 from .possible_kernels import possible
-from .mask_kernels import bit_index, compatible, count_bits, pair_readings
+from .mask_kernels import bit_index, narrow, pair_readings
 from .pose_kernels import finish, settle, start_pose
 from .proof_kernels import locate, workspace
 from .reading_kernels import carry
@@ -87,13 +87,10 @@ def search_model(
     points = contacts[0]
     n, features, words = len(points), packed.shape[2], len(first_domain)
     start = prefixes.shape[1]
-    readings = np.empty((n, n, 5))
+    readings = np.empty((n, n, 9))
     pair_readings(contacts, errors, readings)
-    masks = np.empty((n, n, features, words), np.uint64)
-    known = np.zeros((n, n, features), np.bool_)
-    fits = np.zeros(64 * words, np.uint8)
-    fit_words = fits.view(np.uint64)
     left = np.zeros((n + 1, n, words), np.uint64)
+    sizes = np.full((n + 1, n), features)
     untried = np.zeros((n, words), np.uint64)
     null_left = np.zeros(n, np.bool_)
     faces = np.full(n, -1, np.int64)
@@ -122,6 +119,7 @@ def search_model(
     for m in range(len(prefixes)):
         for j in range(n):
             left[start, j] = everything
+            sizes[start, j] = features
         if start == 0:
             left[0, 0] = first_domain
         nulls[start] = 0
@@ -132,22 +130,17 @@ def search_model(
                 nulls[start] += 1
                 continue
             for j in range(start, n):
-                if not known[i, j, f]:
-                    compatible(
-                        f,
-                        packed,
-                        half_angles[f],
-                        readings[i, j],
-                        errors[i],
-                        errors[j],
-                        switches,
-                        fits,
-                        fit_words,
-                        masks[i, j, f],
-                    )
-                    known[i, j, f] = True
-                for w in range(words):
-                    left[start, j, w] &= masks[i, j, f, w]
+                sizes[start, j] = narrow(
+                    f,
+                    packed,
+                    half_angles[f],
+                    readings[i, j],
+                    errors[i],
+                    errors[j],
+                    switches,
+                    left[start, j],
+                    left[start, j],
+                )
         posed[start] = -1
         level = start
         untried[level] = left[level, level]
@@ -179,8 +172,8 @@ def search_model(
             empty = 0
             completions = 1.0
             for j in range(depth, n):
-                if face >= 0 and not known[level, j, face]:
-                    compatible(
+                if face >= 0:
+                    some = narrow(
                         face,
                         packed,
                         half_angles[face],
@@ -188,18 +181,13 @@ def search_model(
                         errors[level],
                         errors[j],
                         switches,
-                        fits,
-                        fit_words,
-                        masks[level, j, face],
+                        left[level, j],
+                        left[depth, j],
                     )
-                    known[level, j, face] = True
-                some = 0
-                for w in range(words):
-                    bits = left[level, j, w]
-                    if face >= 0:
-                        bits &= masks[level, j, face, w]
-                    left[depth, j, w] = bits
-                    some += count_bits(bits)
+                else:
+                    left[depth, j] = left[level, j]
+                    some = sizes[level, j]
+                sizes[depth, j] = some
                 if some == 0:
                     empty += 1
                     if nulls[depth] + empty > spare:
