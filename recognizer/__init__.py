@@ -6,9 +6,10 @@ Recognition and Localization from Sparse Range or Tactile Data", MIT AI Memo 738
 - `polyhedron`: a mesh becomes planar faces with the solid's own symmetries;
 - `ranges`: what two points on two given faces can be to each other, tabled once a model;
 - `tree`: a face for each contact, pruned pair by pair;
-- `pose`: the pose that an interpretation allows, or none;
+- `pose`: the pose that an interpretation allows, or a proof that there is none;
 - `hypotheses`: interpretations with the same pose are one;
-- `recognize`: the five in a row, over a library.
+- `recognize`: the five in a row, over a library; `solid_recognize` and `planar_recognize` run them
+  for one solid, as one compiled search, and for one outline of the plane.
 
 How it differs from the memo: tables are exact for concave faces too; position error enters every
 constraint, twice the bound for a difference of two points; the direction constraint's interval has
@@ -25,6 +26,7 @@ from .comparison import PoseDifference, pose_difference
 from .contacts import Contacts
 from .hypotheses import Hypothesis, PoseTolerance
 from .library import load_folder
+from .polygon import Polygon
 from .polyhedron import Polyhedron
 from .ranges import PairTables
 from .recognize import Recognizer, SearchLimits
@@ -36,6 +38,7 @@ __all__ = [
     "Contacts",
     "Hypothesis",
     "PairTables",
+    "Polygon",
     "Polyhedron",
     "PoseDifference",
     "PoseTolerance",

@@ -1,8 +1,8 @@
 """Compiled first guess: the rotation that fits the normals best, and how far off it can be.
 
-Davenport's q-method: the sum of ``|R m - n|^2``, each over its squared bound, is a quadratic form in
-the quaternion of R, so its least is at an eigenvector, and a rotation whose sum is within what the
-bounds allow is within an ellipsoid about it.
+Davenport's q-method: the sum of ``|R m - n|^2``, each over its squared bound, is a quadratic form
+in the quaternion of R, so its least is at an eigenvector, and a rotation whose sum is within what
+the bounds allow is within an ellipsoid about it.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ ROUNDING = 1e-6
 
 @njit(cache=True)
 def _eigenvectors(matrix, vectors):
-    """Jacobi's method on a symmetric (4, 4) matrix, which ends diagonal; eigenvectors in columns."""
+    """Jacobi's method on a symmetric (4, 4) matrix, which ends diagonal, into columns."""
     for a in range(4):
         for b in range(4):
             vectors[a, b] = 1.0 if a == b else 0.0

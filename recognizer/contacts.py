@@ -55,7 +55,7 @@ class Contacts:
                 without a bound or a bound without normals.
         """
         points = _rows("positions", positions)
-        count, dimension = points.shape
+        count, dimension = len(points), int(points.shape[-1])
         cones = _bounds(
             "normal_error", np.pi if normal_error is None else normal_error, count, np.pi
         )
@@ -69,9 +69,9 @@ class Contacts:
             raise ValueError(
                 f"{count} positions but {len(directions)} normals: give one normal a position"
             )
-        if directions.shape[1] != dimension:
+        if directions.shape[-1] != dimension:
             raise ValueError(
-                f"positions have {dimension} coordinates but normals {directions.shape[1]}"
+                f"positions have {dimension} coordinates but normals {directions.shape[-1]}"
             )
         unknown = np.isnan(directions).all(axis=1)
         if normal_error is None and not unknown.all():

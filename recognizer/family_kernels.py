@@ -103,7 +103,18 @@ def span_family(
             )
             # A curved family leaves its tangent: a nudge brings the pose back into the bounds.
             seek_feasible(
-                count, faces, faces, contacts, model, 20, False, turned, np.pi, turned, shifted, work
+                count,
+                faces,
+                faces,
+                contacts,
+                model,
+                20,
+                False,
+                turned,
+                np.pi,
+                turned,
+                shifted,
+                work,
             )
             # At the family's end it brings it back to where it came from: no new pose.
             moved = _moved(rotations[at], translations[at], turned, shifted, model)

@@ -97,7 +97,10 @@ def _gather(
     lone_points = np.concatenate([*points, np.zeros((0, 3))])
     lone_start = piece_start[-1] + np.cumsum([0, *map(len, points)])
     cone_sizes = [1] * model.face_count + [len(cone) for cone in cones]
-    half = [float(np.arccos(np.clip(c @ m, -1.0, 1.0)).max()) for c, m in zip(cones, middles, strict=True)]
+    half = [
+        float(np.arccos(np.clip(c @ m, -1.0, 1.0)).max())
+        for c, m in zip(cones, middles, strict=True)
+    ]
     return Features(
         normals=np.ascontiguousarray(np.vstack([model.normals, *middles])),
         offsets=np.concatenate(

@@ -121,7 +121,7 @@ def cluster(
                 weight=1.0,
                 interpretations=poses.faces[members],
                 freedoms=motions[leader].T[open_motions],
-                covariance=covariances[leader],
+                covariance=covariances[leader].astype(float),
             )
         )
         log_weights[group] = log_volumes[members].max()

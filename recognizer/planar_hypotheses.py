@@ -64,7 +64,7 @@ def cluster_planar(
                 weight=1.0,
                 interpretations=_distinct(poses.faces[members]),
                 freedoms=motions[leader].T[open_motions],
-                covariance=covariances[leader],
+                covariance=covariances[leader].astype(float),
             )
         )
         log_weights[group] = log_volumes[members].max()

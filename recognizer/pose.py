@@ -119,7 +119,7 @@ class ModelTest:
             interpretations: (m, n) a feature for each contact, -1 for none.
             contacts: the n contacts.
         """
-        verdicts, *rest = pose_kernels.test_interpretations(
+        verdicts, turns, shifts, costs, informations = pose_kernels.test_interpretations(
             np.ascontiguousarray(interpretations, np.int32),
             kernel_contacts(contacts),
             self.model,
@@ -128,7 +128,8 @@ class ModelTest:
             self.boxes,
             self.pool,
         )
-        poses = Poses(interpretations, *rest, verdicts == FEASIBLE)
+        proven = verdicts == FEASIBLE
+        poses = Poses(interpretations, turns, shifts, costs, informations, proven)
         return poses.take(verdicts != REJECTED)
 
     def span(

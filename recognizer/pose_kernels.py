@@ -6,7 +6,6 @@ import numpy as np
 from numba import njit
 
 from .align_kernels import align, middle_translation
-from .feasibility_kernels import seek_feasible
 from .fit_kernels import assemble_fit, fit_pose
 from .proof_kernels import locate, workspace
 from .reading_kernels import carry, read, worst_on_pieces
@@ -16,9 +15,6 @@ from .verdict_kernels import BESIDE, EXACT, FEASIBLE, REJECTED, judge
 LEAF_STEPS = 6
 """Steps of the first verdict; what it leaves open is cut into boxes."""
 FIT_STEPS = 20
-SEEK_STEPS = 20
-VAGUE = 1.2
-"""An angle (radians) of rotations too wide to be searched box by box before luck is tried."""
 
 
 @njit(cache=True)
@@ -59,58 +55,6 @@ def start_pose(count, faces, contacts, model, half_angles, middles, rotation, tr
 
 
 @njit(cache=True)
-def _seek_from_many(count, faces, contacts, model, rotation, translation, work):
-    """A witness sought from the 24 quarter turns of the starting pose; whether there is one.
-
-    They are spread evenly over all rotations, no more than 63 degrees from any.
-    """
-    points, measured = contacts[0], contacts[1]
-    readings, x, u = work[0], work[3][0], work[3][1]
-    base, shift = rotation.copy(), translation.copy()
-    held = np.zeros(3)
-    for i in range(count):
-        if faces[i] >= 0:
-            held += points[i] / count
-    held = base.T @ (held - shift)
-    for turn in range(24):
-        # Which axis goes where (six ways), and two signs; the third makes it a rotation.
-        first, side = turn // 8, (turn // 4) % 2
-        second = (first + 1 + side) % 3
-        third = 3 - first - second
-        turned = np.zeros((3, 3))
-        turned[0, first] = 1.0 - 2.0 * (turn % 2)
-        turned[1, second] = 1.0 - 2.0 * ((turn // 2) % 2)
-        turned[2, third] = turned[0, first] * turned[1, second] * (1.0 - 2.0 * side)
-        rotation[:] = base @ turned
-        translation[:] = shift + base @ held - rotation @ held
-        fit_pose(count, faces, contacts, model, FIT_STEPS, rotation, translation, readings)
-        for attempt in range(2):
-            carry(count, points, measured, rotation, translation, x, u)
-            worst = read(count, faces, faces, x, u, model, contacts, readings)
-            if worst <= 1.0 + EXACT:
-                worst, _ = worst_on_pieces(count, faces, faces, x, model, contacts, readings)
-            if worst <= 1.0 + EXACT:
-                return True
-            if attempt == 0:
-                seek_feasible(
-                    count,
-                    faces,
-                    faces,
-                    contacts,
-                    model,
-                    SEEK_STEPS,
-                    False,
-                    rotation,
-                    np.pi,
-                    rotation,
-                    translation,
-                    work,
-                )
-    rotation[:], translation[:] = base, shift
-    return False
-
-
-@njit(cache=True)
 def settle(count, faces, contacts, model, angle, most, rotation, translation, work, stack):
     """Judge an interpretation as far as a budget of boxes allows.
 
@@ -145,12 +89,8 @@ def settle(count, faces, contacts, model, angle, most, rotation, translation, wo
         translation,
         work,
     )
-    if verdict == REJECTED or verdict == FEASIBLE:
+    if verdict in (REJECTED, FEASIBLE):
         return verdict, 0
-    if angle > VAGUE and _seek_from_many(
-        count, faces, contacts, model, rotation, translation, work
-    ):
-        return FEASIBLE, 0
     if verdict == BESIDE:
         locate(count, faces, faces, model, contacts, rotation, ball, angle, work)
     return search_poses(

@@ -1,11 +1,12 @@
 """Compiled proof that no pose meets all bounds, from weights on the readings of one pose.
 
-The weighted readings of a least-squares fit are multipliers (Farkas): whatever ``l_k`` are, any pose
-within the bounds has ``sum l_k . x_k <= sum support(l_k) + |l_k| bound_k``. With gaps times weights
-for ``l_k`` the left side is larger at this pose. Over the poses that `region_kernels` leaves, it changes by a linear part, which
-is zero at the best fit, and by a quadratic one, of which all contacts share a single (3, 3) form; a
-turn by an angle t scales the two by ``sin t / t`` and ``2 (1 - cos t) / t^2``, neither above 1. If that
-does not make up the difference, no pose meets the bounds.
+The weighted readings of a least-squares fit are multipliers (Farkas): whatever ``l_k`` are, any
+pose within the bounds has ``sum l_k . x_k <= sum support(l_k) + |l_k| bound_k``. With gaps times
+weights for ``l_k`` the left side is larger at this pose. Over the poses that `region_kernels`
+leaves, it changes by a linear part, which is zero at the best fit, and by a quadratic one, of which
+all contacts share a single (3, 3) form; a turn by an angle t scales the two by ``sin t / t`` and
+``2 (1 - cos t) / t^2``, neither above 1. If that does not make up the difference, no pose meets the
+bounds.
 """
 
 from __future__ import annotations
@@ -63,7 +64,7 @@ def _add(lever, direction, weight, residual, system, gradient):
 def assemble(count, faces, levers, u, normals, contacts, readings, weights, system, gradient):
     """Normal equations of the weighted readings, in place."""
     _, _, reaches, chords, sines = contacts
-    gaps, lengths, heights, regions, kinds, misses, directions = readings
+    gaps, _, heights, regions, kinds, misses, directions = readings
     system[:] = 0.0
     gradient[:] = 0.0
     for i in range(count):

@@ -15,7 +15,6 @@ from .belief import Belief, Search
 from .contacts import Contacts
 from .features import Features
 from .hypotheses import Hypothesis, PoseTolerance
-from .planar_ranges import PlanarTables
 from .planar_recognize import PlanarEntry, search_polygon, span_polygon
 from .polygon import Polygon
 from .polyhedron import Polyhedron
@@ -58,7 +57,7 @@ class Recognizer:
 
     def __init__(
         self,
-        models: Iterable[Polyhedron] | Iterable[Polygon],
+        models: Iterable[Polyhedron | Polygon],
         *,
         features: Literal["faces", "all"] = "faces",
         constraints: Constraints | None = None,
@@ -81,17 +80,17 @@ class Recognizer:
             ValueError: no model at all, two of the same name, solids and outlines together, edges
                 and vertices of outlines.
         """
-        self.models: tuple[Polyhedron | Polygon, ...] = tuple(models)
-        if not self.models:
+        everything = tuple(models)
+        if not everything:
             raise ValueError("a recogniser needs at least one model; the library is empty")
-        names = [model.name for model in self.models]
+        names = [model.name for model in everything]
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
             raise ValueError(f"two models are called {twice[0]!r}; names must differ")
         if features not in ("faces", "all"):
             raise ValueError(f"features is {features!r}; it must be 'faces' or 'all'")
-        solids = [model for model in self.models if isinstance(model, Polyhedron)]
-        outlines = [model for model in self.models if isinstance(model, Polygon)]
+        solids = tuple(model for model in everything if isinstance(model, Polyhedron))
+        outlines = tuple(model for model in everything if isinstance(model, Polygon))
         if solids and outlines:
             raise ValueError(
                 f"{solids[0].name!r} is a solid and {outlines[0].name!r} an outline of the plane;"
@@ -99,34 +98,33 @@ class Recognizer:
             )
         if outlines and features == "all":
             raise ValueError("features 'all' is for solids; outlines have edges alone")
+        self.models = solids
+        self.outlines = outlines
         self.dimension = 3 if solids else 2
         self.constraints = constraints or Constraints()
         self.tolerance = tolerance or PoseTolerance()
         self.limits = limits or SearchLimits()
         self._solids = tuple(
-            SolidEntry.of(model, edges=features == "all", cache=cache) for model in solids
+            SolidEntry.of(model, edges=features == "all", folder=cache) for model in solids
         )
         self._outlines = tuple(PlanarEntry.of(model) for model in outlines)
-        self._spans = np.array([model.diameter for model in self.models])
+        self._spans = np.array([model.diameter for model in solids])
 
-    def tables(self, name: str) -> PairTables | PlanarTables:
-        """The range tables of one model.
+    def tables(self, name: str) -> PairTables:
+        """The range tables of a solid.
 
         Raises:
-            ValueError: no model of that name.
+            ValueError: no solid of that name.
         """
-        return self._entry(name).tables
+        return self._solid(name).tables
 
     def features(self, name: str) -> Features:
         """What of a solid contacts may lie on; interpretations are rows of its indices.
 
         Raises:
-            ValueError: no model of that name, or an outline.
+            ValueError: no solid of that name.
         """
-        entry = self._entry(name)
-        if isinstance(entry, PlanarEntry):
-            raise ValueError(f"{name!r} is an outline; its features are its edges")
-        return entry.features
+        return self._solid(name).features
 
     def sample_poses(
         self, hypothesis: Hypothesis, contacts: Contacts, most: int = 256
@@ -149,11 +147,17 @@ class Recognizer:
             return span_polygon(entry, hypothesis, contacts, self.tolerance, most)
         return span_solid(entry, hypothesis, contacts, self.tolerance, most)
 
+    def _solid(self, name: str) -> SolidEntry:
+        entry = self._entry(name)
+        if isinstance(entry, PlanarEntry):
+            raise ValueError(f"{name!r} is an outline; it has edges alone, and planar tables")
+        return entry
+
     def _entry(self, name: str) -> SolidEntry | PlanarEntry:
         for entry in (*self._solids, *self._outlines):
             if entry.model.name == name:
                 return entry
-        known = ", ".join(model.name for model in self.models)
+        known = ", ".join(entry.model.name for entry in (*self._solids, *self._outlines))
         raise ValueError(f"no model is called {name!r}; there are: {known}")
 
     def recognize(self, contacts: Contacts, *, outliers: int = 0) -> Belief:

@@ -1,9 +1,9 @@
 """Compiled bounds on where a pose can be: a region that holds every pose within the bounds.
 
 A small motion ``z = (w, s)`` of the object, in its own frame, turns it by ``w`` about a pivot and
-shifts it by ``s``: a contact ``x`` becomes ``x - w x a - s`` with the lever ``a = x - pivot``, up to
-a remainder that is quadratic in ``w``. Every pose within the bounds keeps each reading's linear part
-within its bound plus that remainder, so the weighted sum of their squares confines ``z`` to an
+shifts it by ``s``: a contact ``x`` becomes ``x - w x a - s`` with the lever ``a = x - pivot``, up
+to a remainder that is quadratic in ``w``. Every pose within the bounds keeps each reading's linear
+part within its bound plus that remainder, so the weighted sum of their squares confines ``z`` to an
 ellipsoid. A smaller ellipsoid has smaller remainders, which confine it further: a few rounds take
 the half radian that the normals leave to the degree that the positions allow.
 """
@@ -57,7 +57,7 @@ def invert_symmetric(matrix, inverse, factor):
 
 @njit(cache=True)
 def largest_eigenvalue(m):
-    """Of a symmetric (3, 3) matrix, or of a larger one's first block, in closed form (Smith 1961), rounded up."""
+    """Of a symmetric (3, 3) matrix, or of a larger one's first block, rounded up (Smith 1961)."""
     off = m[0, 1] * m[0, 1] + m[0, 2] * m[0, 2] + m[1, 2] * m[1, 2]
     mean = (m[0, 0] + m[1, 1] + m[2, 2]) / 3.0
     d0, d1, d2 = m[0, 0] - mean, m[1, 1] - mean, m[2, 2] - mean
@@ -161,8 +161,9 @@ def region_workspace(count):
     """Work space of `bound_region` for a number of contacts, with a region in it.
 
     Returns:
-        spread (3, 3): every pose's ``w`` has ``(w . p)^2 <= p^T spread p``; inverse (6, 6) and centre
-        (6,): every pose's ``z`` has ``((z - centre) . p)^2 <= p^T inverse p``; and work space.
+        spread (3, 3): every pose's ``w`` has ``(w . p)^2 <= p^T spread p``; inverse (6, 6) and
+        centre (6,): every pose's ``z`` has ``((z - centre) . p)^2 <= p^T inverse p``; and work
+        space.
     """
     return (
         np.empty((3, 3)),
@@ -198,8 +199,8 @@ def _note_places(count, faces, targets, x, levers, model, reaches, readings, tab
     """Places of contacts that are bounded on both sides, as rows; returns how many.
 
     The height over the face's plane, whatever of the face is nearest; and, for a contact that lies
-    outside it, the place along the gap, which the face bounds ahead and behind. For these the excess
-    and its least possible value are noted too: see `_narrow`.
+    outside it, the place along the gap, which the face bounds ahead and behind. For these the
+    excess and its least possible value are noted too: see `_narrow`.
     """
     normals, start, corners = model[0], model[3], model[4]
     gaps, _, heights, regions, _, _, _ = readings
@@ -311,7 +312,7 @@ def bound_region(
         ``|v - w|`` apart.)
     """
     normals = model[0]
-    kinds, misses, directions = readings[4], readings[5], readings[6]
+    kinds, misses = readings[4], readings[5]
     chords = contacts[3]
     spread, inverse, centre, systems, slopes, root, table, cone_weights = region
     system, trial, factor = systems

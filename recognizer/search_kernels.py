@@ -11,13 +11,15 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from .possible_kernels import possible
+from .align_kernels import middle_translation
+from .cell_kernels import facing, narrow_in_cell
 from .mask_kernels import bit_index, narrow, pair_readings
 from .pose_kernels import finish, settle, start_pose
+from .possible_kernels import possible
 from .proof_kernels import locate, workspace
 from .reading_kernels import carry
-from .search_pose_kernels import box_stack
 from .region_kernels import square_root
+from .search_pose_kernels import box_stack
 from .verdict_kernels import FEASIBLE, REJECTED, judge
 
 _ONE = np.uint64(1)
@@ -54,6 +56,8 @@ def search_model(
     most_leaves,
     most_boxes,
     pool,
+    cells,
+    cell_angle,
 ):
     """All interpretations that some pose allows, each with such a pose.
 
@@ -78,6 +82,9 @@ def search_model(
         most_leaves: budget of interpretations.
         most_boxes: the most boxes of rotations to look at for a leaf.
         pool: the same for all leaves together.
+        cells: (c, 3, 3) rotations, object to world, to search around one by one; none, and the
+            normals have to say where to look.
+        cell_angle: an angle within which each rotation is from some cell's.
 
     Returns:
         (m, n) interpretations; (m, 3, 3) rotations, (m, 3) translations, (m,) least-squares
@@ -114,212 +121,275 @@ def search_model(
     found_informations = np.empty((16, 6, 6))
     found_proven = np.empty(16, np.bool_)
     everything = np.zeros(words, np.uint64)
+    between = np.empty((n, n, 3))
+    facings = np.empty((n, 3))
     for f in range(features):
         everything[f >> 6] |= _ONE << np.uint64(f & 63)
-    for m in range(len(prefixes)):
-        for j in range(n):
-            left[start, j] = everything
-            sizes[start, j] = features
-        if start == 0:
-            left[0, 0] = first_domain
-        nulls[start] = 0
-        for i in range(start):
-            f = prefixes[m, i]
-            faces[i] = f
-            if f < 0:
-                nulls[start] += 1
-                continue
-            for j in range(start, n):
-                sizes[start, j] = narrow(
-                    f,
-                    packed,
-                    half_angles[f],
-                    readings[i, j],
-                    errors[i],
-                    errors[j],
-                    switches,
-                    left[start, j],
-                    left[start, j],
-                )
-        posed[start] = -1
-        level = start
-        untried[level] = left[level, level]
-        null_left[level] = nulls[level] < spare
-        while level >= start:
-            # The next feature of this contact, or none at all.
-            face = -1
-            for w in range(words):
-                bits = untried[level, w]
-                if bits != _NONE:
-                    lowest = bits & (~bits + _ONE)
-                    untried[level, w] = bits ^ lowest
-                    face = w * 64 + bit_index(lowest)
-                    break
-            if face < 0:
-                if not null_left[level]:
-                    level -= 1
+    for turn in range(max(1, len(cells))):
+        in_cell = len(cells) > 0
+        if in_cell:
+            for j in range(n):
+                for i in range(j):
+                    for a in range(3):
+                        between[i, j, a] = 0.0
+                        for b in range(3):
+                            between[i, j, a] += cells[turn, b, a] * (points[j, b] - points[i, b])
+                for a in range(3):
+                    facings[j, a] = 0.0
+                    for b in range(3):
+                        facings[j, a] += cells[turn, b, a] * contacts[1][j, b]
+        for m in range(len(prefixes)):
+            for j in range(n):
+                left[start, j] = everything
+                sizes[start, j] = features
+            if start == 0:
+                left[0, 0] = first_domain
+            if in_cell:
+                for j in range(start, n):
+                    sizes[start, j] = facing(
+                        facings[j],
+                        contacts[3][j],
+                        contacts[4][j],
+                        cell_angle,
+                        model,
+                        left[start, j],
+                        near,
+                    )
+            nulls[start] = 0
+            for i in range(start):
+                f = prefixes[m, i]
+                faces[i] = f
+                if f < 0:
+                    nulls[start] += 1
                     continue
-                null_left[level] = False
-            faces[level] = face
-            depth = level + 1
-            nulls[depth] = nulls[level] + (1 if face < 0 else 0)
-            if counts[NODES] == most_nodes or found == most_leaves:
-                counts[CUT] = 1
-                level = -1
-                break
-            counts[NODES] += 1
-            nodes[level] += 1
-            empty = 0
-            completions = 1.0
-            for j in range(depth, n):
-                if face >= 0:
-                    some = narrow(
-                        face,
+                for j in range(start, n):
+                    sizes[start, j] = narrow(
+                        f,
                         packed,
-                        half_angles[face],
-                        readings[level, j],
-                        errors[level],
+                        half_angles[f],
+                        readings[i, j],
+                        errors[i],
                         errors[j],
                         switches,
-                        left[level, j],
-                        left[depth, j],
+                        left[start, j],
+                        left[start, j],
                     )
-                else:
-                    left[depth, j] = left[level, j]
-                    some = sizes[level, j]
-                sizes[depth, j] = some
-                if some == 0:
-                    empty += 1
-                    if nulls[depth] + empty > spare:
+                    if in_cell:
+                        sizes[start, j] = narrow_in_cell(
+                            f,
+                            packed,
+                            half_angles,
+                            model[0],
+                            between[i, j],
+                            readings[i, j, 4],
+                            cell_angle,
+                            left[start, j],
+                        )
+            posed[start] = -1
+            level = start
+            untried[level] = left[level, level]
+            null_left[level] = nulls[level] < spare
+            while level >= start:
+                # The next feature of this contact, or none at all.
+                face = -1
+                for w in range(words):
+                    bits = untried[level, w]
+                    if bits != _NONE:
+                        lowest = bits & (~bits + _ONE)
+                        untried[level, w] = bits ^ lowest
+                        face = w * 64 + bit_index(lowest)
                         break
-                completions *= max(some, 1)
-            if nulls[depth] + empty > spare:
-                continue
-            posed[depth] = posed[level]
-            last = posed[depth]
-            leaf = depth == n
-            if not leaf and (depth < 3 or completions <= crowd):
-                level = depth
-                untried[level] = left[level, level]
-                null_left[level] = nulls[level] < spare
-                continue
-            # Where the pose can be: about that of a shorter branch, or as the normals have it.
-            if last >= 0:
-                rotation[:], translation[:] = turns[last], shifts[last]
-                angle = angles[last]
-            else:
-                angle = start_pose(
-                    depth, faces, contacts, model, half_angles, middles, rotation, translation
-                )
-                if angle < 0.0:
+                if face < 0:
+                    if not null_left[level]:
+                        level -= 1
+                        continue
+                    null_left[level] = False
+                faces[level] = face
+                depth = level + 1
+                nulls[depth] = nulls[level] + (1 if face < 0 else 0)
+                if counts[NODES] == most_nodes or found == most_leaves:
+                    counts[CUT] = 1
+                    level = -1
+                    break
+                counts[NODES] += 1
+                nodes[level] += 1
+                empty = 0
+                completions = 1.0
+                for j in range(depth, n):
+                    if face >= 0:
+                        some = narrow(
+                            face,
+                            packed,
+                            half_angles[face],
+                            readings[level, j],
+                            errors[level],
+                            errors[j],
+                            switches,
+                            left[level, j],
+                            left[depth, j],
+                        )
+                        if in_cell and some:
+                            some = narrow_in_cell(
+                                face,
+                                packed,
+                                half_angles,
+                                model[0],
+                                between[level, j],
+                                readings[level, j, 4],
+                                cell_angle,
+                                left[depth, j],
+                            )
+                    else:
+                        left[depth, j] = left[level, j]
+                        some = sizes[level, j]
+                    sizes[depth, j] = some
+                    if some == 0:
+                        empty += 1
+                        if nulls[depth] + empty > spare:
+                            break
+                    completions *= max(some, 1)
+                if nulls[depth] + empty > spare:
                     continue
-            if not leaf:
-                if angle > VAGUE:
+                posed[depth] = posed[level]
+                last = posed[depth]
+                leaf = depth == n
+                if not leaf and (depth < 3 or completions <= crowd):
                     level = depth
                     untried[level] = left[level, level]
                     null_left[level] = nulls[level] < spare
                     continue
-                counts[VERDICTS] += 1
-                ball[:] = rotation
-                verdict, angle, _, _ = judge(
-                    depth,
-                    faces,
+                # Where the pose can be: about that of a shorter branch, or as the normals have it.
+                if last >= 0:
+                    rotation[:], translation[:] = turns[last], shifts[last]
+                    angle = angles[last]
+                elif in_cell:
+                    rotation[:] = cells[turn]
+                    middle_translation(depth, faces, points, middles, rotation, translation)
+                    angle = cell_angle
+                else:
+                    angle = start_pose(
+                        depth, faces, contacts, model, half_angles, middles, rotation, translation
+                    )
+                    if angle < 0.0:
+                        continue
+                if not leaf:
+                    if angle > VAGUE:
+                        level = depth
+                        untried[level] = left[level, level]
+                        null_left[level] = nulls[level] < spare
+                        continue
+                    counts[VERDICTS] += 1
+                    ball[:] = rotation
+                    verdict, angle, _, _ = judge(
+                        depth,
+                        faces,
+                        faces,
+                        contacts,
+                        model,
+                        ball,
+                        angle,
+                        INNER_STEPS,
+                        False,
+                        rotation,
+                        translation,
+                        work,
+                    )
+                    if verdict != REJECTED:
+                        angle, _ = locate(
+                            depth, faces, faces, model, contacts, rotation, ball, angle, work
+                        )
+                    if verdict == REJECTED or angle < 0.0:
+                        counts[INNER_REJECTED] += 1
+                        continue
+                    posed[depth] = depth
+                    turns[depth], shifts[depth], angles[depth] = rotation, translation, angle
+                    square_root(work[1][0], root)
+                    x, u, levers = work[3][0], work[3][1], work[3][2]
+                    pivot = work[5][2]
+                    empty = 0
+                    carry(n, points, contacts[1], rotation, translation, x, u)
+                    for j in range(depth, n):
+                        some = False
+                        for k in range(3):
+                            levers[j, k] = x[j, k] - pivot[k]
+                        for w in range(words):
+                            bits = left[depth, j, w]
+                            kept = bits
+                            while bits != _NONE:
+                                lowest = bits & (~bits + _ONE)
+                                bits ^= lowest
+                                if not possible(
+                                    x[j],
+                                    u[j],
+                                    levers[j],
+                                    w * 64 + bit_index(lowest),
+                                    contacts[2][j],
+                                    contacts[3][j],
+                                    contacts[4][j],
+                                    model,
+                                    angle,
+                                    work[1],
+                                    root,
+                                    row,
+                                    near,
+                                ):
+                                    kept ^= lowest
+                            left[depth, j, w] = kept
+                            some |= kept != _NONE
+                        if not some:
+                            empty += 1
+                            if nulls[depth] + empty > spare:
+                                break
+                    if nulls[depth] + empty > spare:
+                        counts[INNER_REJECTED] += 1
+                        continue
+                    level = depth
+                    untried[level] = left[level, level]
+                    null_left[level] = nulls[level] < spare
+                    continue
+                # A pose may be in several cells.
+                same = found
+                if in_cell:
+                    for k in range(found):
+                        if np.all(found_faces[k] == faces):
+                            same = k
+                            break
+                    if same < found and found_proven[same]:
+                        continue
+                counts[LEAVES_TRIED] += 1
+                verdict, looked = settle(
+                    n,
                     faces,
                     contacts,
                     model,
-                    ball,
                     angle,
-                    INNER_STEPS,
-                    False,
+                    min(most_boxes, pool),
                     rotation,
                     translation,
                     work,
+                    stack,
                 )
-                if verdict != REJECTED:
-                    angle, _ = locate(
-                        depth, faces, faces, model, contacts, rotation, ball, angle, work
-                    )
-                if verdict == REJECTED or angle < 0.0:
-                    counts[INNER_REJECTED] += 1
+                pool -= looked
+                counts[BOXES] += looked
+                if verdict == REJECTED or (same < found and verdict != FEASIBLE):
                     continue
-                posed[depth] = depth
-                turns[depth], shifts[depth], angles[depth] = rotation, translation, angle
-                square_root(work[1][0], root)
-                x, u, levers = work[3][0], work[3][1], work[3][2]
-                pivot = work[5][2]
-                empty = 0
-                carry(n, points, contacts[1], rotation, translation, x, u)
-                for j in range(depth, n):
-                    some = False
-                    for k in range(3):
-                        levers[j, k] = x[j, k] - pivot[k]
-                    for w in range(words):
-                        bits = left[depth, j, w]
-                        kept = bits
-                        while bits != _NONE:
-                            lowest = bits & (~bits + _ONE)
-                            bits ^= lowest
-                            if not possible(
-                                x[j],
-                                u[j],
-                                levers[j],
-                                w * 64 + bit_index(lowest),
-                                contacts[2][j],
-                                contacts[3][j],
-                                contacts[4][j],
-                                model,
-                                angle,
-                                work[1],
-                                root,
-                                row,
-                                near,
-                            ):
-                                kept ^= lowest
-                        left[depth, j, w] = kept
-                        some |= kept != _NONE
-                    if not some:
-                        empty += 1
-                        if nulls[depth] + empty > spare:
-                            break
-                if nulls[depth] + empty > spare:
-                    counts[INNER_REJECTED] += 1
-                    continue
-                level = depth
-                untried[level] = left[level, level]
-                null_left[level] = nulls[level] < spare
-                continue
-            counts[LEAVES_TRIED] += 1
-            verdict, looked = settle(
-                n,
-                faces,
-                contacts,
-                model,
-                angle,
-                min(most_boxes, pool),
-                rotation,
-                translation,
-                work,
-                stack,
-            )
-            pool -= looked
-            counts[BOXES] += looked
-            if verdict == REJECTED:
-                continue
-            if found == len(found_costs):
-                found_faces = _larger(found_faces, 2 * found)
-                found_turns = _larger(found_turns, 2 * found)
-                found_shifts = _larger(found_shifts, 2 * found)
-                found_costs = _larger(found_costs, 2 * found)
-                found_informations = _larger(found_informations, 2 * found)
-                found_proven = _larger(found_proven, 2 * found)
-            found_costs[found] = finish(
-                n, faces, contacts, model, rotation, translation, work, found_informations[found]
-            )
-            found_faces[found] = faces
-            found_turns[found] = rotation
-            found_shifts[found] = translation
-            found_proven[found] = verdict == FEASIBLE
-            found += 1
+                if found == len(found_costs):
+                    found_faces = _larger(found_faces, 2 * found)
+                    found_turns = _larger(found_turns, 2 * found)
+                    found_shifts = _larger(found_shifts, 2 * found)
+                    found_costs = _larger(found_costs, 2 * found)
+                    found_informations = _larger(found_informations, 2 * found)
+                    found_proven = _larger(found_proven, 2 * found)
+                found_costs[same] = finish(
+                    n, faces, contacts, model, rotation, translation, work, found_informations[same]
+                )
+                found_faces[same] = faces
+                found_turns[same] = rotation
+                found_shifts[same] = translation
+                found_proven[same] = verdict == FEASIBLE
+                found += same == found
+            if counts[CUT]:
+                break
         if counts[CUT]:
             break
     return (

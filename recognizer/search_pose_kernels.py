@@ -156,9 +156,7 @@ def search_poses(count, faces, contacts, model, angle, most, rotation, translati
             best_turn[:], best_shift[:] = rotation, translation
         small = diagonal < FINEST
         kept[top, :count] = weights[:count]
-        if outcome == UNDECIDED and (
-            diagonal < FINE or looked % SEEK == 0 or worst < NEARLY
-        ):
+        if outcome == UNDECIDED and (diagonal < FINE or looked % SEEK == 0 or worst < NEARLY):
             turned[:], shifted[:] = rotation, translation
             outcome = seek_feasible(
                 count, faces, chosen, contacts, model, 60, True, ball, bound, turned, shifted, work

@@ -7,14 +7,14 @@ search, see `search_kernels`.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import RigidTransform
+from scipy.spatial.transform import RigidTransform, Rotation
 
 from . import search_kernels
 from .belief import Search
@@ -35,6 +35,11 @@ EXACT_SYMMETRY = 1e-7
 """How far a symmetry may miss, as a share of the smallest bound on a position, to stand for a part
 of the search: what it misses is then below what a witness may miss a bound by."""
 
+CELLS = 16
+"""Cells across half a turn to either side."""
+
+Floats = NDArray[np.float64]
+NO_CELLS: tuple[Floats, float] = (np.zeros((0, 3, 3)), 0.0)
 Roots = tuple[NDArray[np.uint64], NDArray[np.uint64]]
 
 
@@ -50,19 +55,19 @@ class SolidEntry:
     """The tables as the kernels read them."""
 
     @classmethod
-    def of(cls, model: Polyhedron, *, edges: bool, cache: Path | None) -> SolidEntry:
+    def of(cls, model: Polyhedron, *, edges: bool, folder: Path | None) -> SolidEntry:
         """Build tables and test of a solid.
 
         Args:
             model: the solid.
             edges: whether contacts may lie on edges and vertices too.
-            cache: a folder to keep tables in; none, and they are built anew.
+            folder: one to keep tables in; none, and they are built anew.
         """
         features = all_features(model) if edges else face_features(model)
         tables = (
             PairTables.of(model, features)
-            if cache is None
-            else cached_tables(model, cache, features=features if edges else None)
+            if folder is None
+            else cached_tables(model, folder, features=features if edges else None)
         )
         return cls(model, features, tables, ModelTest(model, features), pack_tables(tables))
 
@@ -109,7 +114,9 @@ def search_solid(
     everything, orbits = entry.roots
     permutations, missed = entry.permutations
     symmetric = (
-        prefixes is None and len(permutations) > 1 and missed < EXACT_SYMMETRY * smallest
+        prefixes is None
+        and len(permutations) > 1
+        and missed < EXACT_SYMMETRY * smallest
         and outliers == 0
     )
     poses, nodes, counts = _search(
@@ -166,8 +173,32 @@ def _search(
         limits.budget,
         test.boxes,
         test.pool,
+        *(rotation_cells() if _vague(contacts) else NO_CELLS),
     )
     return Poses(*found), nodes, counts
+
+
+def _vague(contacts: Contacts) -> bool:
+    """Whether so few normals are known that they leave the rotation open whatever they are."""
+    return int(np.count_nonzero(contacts.normal_error < np.pi / 2.0)) < 2
+
+
+@cache
+def rotation_cells() -> tuple[Floats, float]:
+    """Rotations that every rotation is close to, and how close.
+
+    Rotation vectors fill a ball of radius pi; the middles of the cubes of a grid on it do, as two
+    turns are no farther apart than their vectors.
+
+    Returns:
+        (c, 3, 3) rotations and an angle, radians.
+    """
+    half = np.pi / CELLS
+    line = np.linspace(-np.pi + half, np.pi - half, CELLS)
+    middles = np.stack(np.meshgrid(line, line, line), axis=-1).reshape(-1, 3)
+    nearest = np.linalg.norm(np.maximum(np.abs(middles) - half, 0.0), axis=1)
+    rotations = Rotation.from_rotvec(middles[nearest < np.pi]).as_matrix()
+    return np.ascontiguousarray(rotations), float(np.sqrt(3.0) * half) + 1e-9
 
 
 def _spread_over_symmetries(

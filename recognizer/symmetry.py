@@ -76,9 +76,7 @@ def rotational_symmetries(faces: FaceSummary, corners: Floats, diameter: float) 
     return np.array(found)
 
 
-def feature_permutations(
-    model: Polyhedron, features: Features
-) -> tuple[NDArray[np.int32], float]:
+def feature_permutations(model: Polyhedron, features: Features) -> tuple[NDArray[np.int32], float]:
     """Where the symmetries of a solid take its features.
 
     Args:

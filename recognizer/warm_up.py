@@ -11,13 +11,15 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform
 
 from .contacts import Contacts
+from .polygon import Polygon
 from .polyhedron import Polyhedron
 from .rays import cast_rays
 from .recognize import Recognizer
+from .tree import prune
 
 
 def warm_up() -> None:
-    """Run the whole recogniser once on a box."""
+    """Run the whole recogniser once on a box and on a rectangle."""
     import trimesh
 
     box = Polyhedron.from_mesh(trimesh.creation.box((1.0, 2.0, 3.0)), name="box")
@@ -25,7 +27,12 @@ def warm_up() -> None:
     contacts = Contacts(
         hits.points_world, hits.normals_world, position_error=0.01, normal_error=0.1
     )
-    Recognizer([box]).recognize(contacts)
+    recognizer = Recognizer([box])
+    recognizer.recognize(contacts).update(contacts)
+    prune(recognizer.tables("box"), contacts)
+    square = Polygon.from_corners([(0.0, 0.0), (1.0, 0.0), (1.0, 2.0), (0.0, 2.0)], name="square")
+    flat = Contacts([(0.5, 0.0)], [(0.0, -1.0)], position_error=0.01, normal_error=0.1)
+    Recognizer([square]).recognize(flat)
 
 
 if __name__ == "__main__":

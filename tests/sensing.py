@@ -51,6 +51,9 @@ class Touches:
     def __len__(self) -> int:
         return len(self.points)
 
+    def __getitem__(self, rows: NDArray[np.integer]) -> Touches:
+        return Touches(self.T_world_object, self.points[rows], self.normals[rows], self.faces[rows])
+
 
 def random_pose(rng: np.random.Generator) -> RigidTransform:
     return RigidTransform.from_components(rng.uniform(-0.5, 0.5, 3), Rotation.random(rng=rng))

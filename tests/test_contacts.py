@@ -108,7 +108,7 @@ def test_contacts_of_the_plane_have_two_coordinates_and_join_none_of_space():
     flat = Contacts([[0, 1]], [[0, 1]], position_error=1, normal_error=1)
     assert flat.dimension == 2
     assert len(Contacts.join([flat, flat[:0]])) == 1
-    with pytest.raises(ValueError, match="plane .* and of space"):
+    with pytest.raises(ValueError, match=r"plane .* and of space"):
         Contacts.join([flat, contacts()])
 
 

@@ -29,7 +29,10 @@ MAY_IMPORT = {
     "envs": {"envs", "assets", "recognizer"},
     "scripts": {"scripts", "policies", "envs", "assets", "recognizer"},
 }
-RECOGNIZER_STANDS_ON = {"numpy", "scipy", "trimesh", "numba", "platformdirs"} | sys.stdlib_module_names
+RECOGNIZER_STANDS_ON = {
+    *("numpy", "scipy", "trimesh", "numba", "platformdirs"),
+    *sys.stdlib_module_names,
+}
 
 
 def files_of(folder: str) -> list[Path]:
