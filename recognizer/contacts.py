@@ -69,10 +69,9 @@ class Contacts:
             raise ValueError(
                 f"{count} positions but {len(directions)} normals: give one normal a position"
             )
-        if directions.shape[-1] != dimension:
-            raise ValueError(
-                f"positions have {dimension} coordinates but normals {directions.shape[-1]}"
-            )
+        coordinates = directions.size // max(count, 1)
+        if count and coordinates != dimension:
+            raise ValueError(f"positions have {dimension} coordinates but normals {coordinates}")
         unknown = np.isnan(directions).all(axis=1)
         if normal_error is None and not unknown.all():
             raise ValueError("normals without normal_error: say how far off they may be, radians")
