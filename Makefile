@@ -76,7 +76,7 @@ smoke: wheel
 	test -s out.png
 
 bench: $(DEV) $(COMPILED)
-	@$(BIN)/python -m palpate.scripts.bench
+	@$(BIN)/python -m palpate.scripts.bench $(ARGS)
 
 soundness: $(DEV) $(COMPILED)
 	@$(BIN)/python -m palpate.scripts.soundness

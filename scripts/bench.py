@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 from enum import StrEnum
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -23,6 +24,7 @@ class Part(StrEnum):
     ICP = "icp"
     START = "start"
     SCALE = "scale"
+    LARGE = "large"
     ACCURACY = "accuracy"
     TABLES = "tables"
 
@@ -37,6 +39,13 @@ def bench(
         list[Part] | None,
         typer.Option(metavar="PART", help=f"Only this part; one or more of: {', '.join(Part)}."),
     ] = None,
+    folder: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="PATH",
+            help="Keep the large library's range tables here; by default in a temporary folder.",
+        ),
+    ] = None,
     quick: Annotated[
         bool, typer.Option("--quick", help="A tenth of the cases and of the library.")
     ] = False,
@@ -45,27 +54,32 @@ def bench(
 
     speed: contacts to belief, where the time goes, and the floor of the bit operations. icp: the
     same contacts given to multi-start ICP. start: the first belief of a fresh process. scale: a
-    large library, large models. accuracy: pose errors beside the memo's Table V. tables: range
-    tables, once a model.
+    large library, and time a model against the number of contacts. large: models of 500 faces.
+    accuracy: pose errors beside the memo's Table V. tables: range tables, once a model.
     """
     keep_to_one_thread()
     # Only now: what these import reads the number of threads once.
     from .bench_accuracy import measure_accuracy
     from .bench_icp import measure_icp
+    from .bench_models import measure_large, measure_tables
     from .bench_report import Settings, show, show_header
-    from .bench_scale import measure_scale, measure_start, measure_tables
+    from .bench_scale import measure_scale
     from .bench_speed import measure_speed
+    from .bench_start import measure_start
 
     parts = {
         Part.SPEED: measure_speed,
         Part.ICP: measure_icp,
         Part.START: measure_start,
         Part.SCALE: measure_scale,
+        Part.LARGE: measure_large,
         Part.ACCURACY: measure_accuracy,
         Part.TABLES: measure_tables,
     }
     share = QUICK if quick else 1
-    settings = Settings(cases=max(cases // share, 1), library=library // share, seed=seed)
+    settings = Settings(
+        cases=max(cases // share, 1), library=library // share, seed=seed, folder=folder
+    )
     show_header(settings)
     for part in only or parts:
         show(parts[part](settings))

@@ -6,6 +6,7 @@ import platform
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
+from pathlib import Path
 from textwrap import fill
 from time import perf_counter, process_time
 from typing import ParamSpec, TypeVar
@@ -17,7 +18,7 @@ from rich.progress import Progress
 from ..envs.grid import TrueContacts, sense_grid
 from ..envs.probe_env import INCH
 from ..envs.sensor import SensorNoise
-from ..recognizer import Contacts, Polyhedron
+from ..recognizer import Belief, Contacts, Polyhedron
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -37,6 +38,8 @@ class Settings:
     library: int = 1000
     """Models in the large library."""
     seed: int = 0
+    folder: Path | None = None
+    """Where the range tables of the large library are kept; None for a temporary folder."""
 
     def __post_init__(self) -> None:
         if self.cases < 1 or self.library < 5 or self.seed < 0:
@@ -72,6 +75,14 @@ class Case:
     model: Polyhedron
     truth: TrueContacts
     contacts: Contacts
+
+    def held_by(self, belief: Belief) -> bool:
+        """Whether the true interpretation is in a belief about these contacts."""
+        return any(
+            bool((hypothesis.interpretations == self.truth.faces).all(axis=1).any())
+            for hypothesis in belief.hypotheses
+            if hypothesis.object_name == self.model.name
+        )
 
 
 def noise_of(pi_over: float, inches: float) -> SensorNoise:

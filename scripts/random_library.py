@@ -9,7 +9,7 @@ earlier one: the same shape, some percent longer in one direction and a little s
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -47,11 +47,16 @@ def random_library(count: int, rng: np.random.Generator) -> tuple[Polyhedron, ..
         Models called ``solid-0000`` and so on, metres; coordinates are single precision, so that
         STL files hold the very same solids.
     """
+    return tuple(draw_solids(count, rng))
+
+
+def draw_solids(count: int, rng: np.random.Generator) -> Iterator[Polyhedron]:
+    """The solids of `random_library`, one by one."""
     models: list[Polyhedron] = []
     for index, own in enumerate(rng.spawn(count)):
         originals = models if index % TWIN_EVERY == TWIN_EVERY - 1 else []
         models.append(_draw(f"solid-{index:04}", originals, own))
-    return tuple(models)
+        yield models[-1]
 
 
 def large_solids(rng: np.random.Generator) -> tuple[Polyhedron, Polyhedron]:
