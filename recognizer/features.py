@@ -78,6 +78,44 @@ def all_features(model: Polyhedron) -> Features:
     return _gather(model, convex_edges(model), convex_vertices(model))
 
 
+def with_squares(features: Features, normals: Floats, middles: Floats, half: float) -> Features:
+    """The same and, behind them, squares of given planes.
+
+    Args:
+        features: of a model.
+        normals: (s, 3) unit normals of the squares.
+        middles: (s, 3) their middles, object frame, metres.
+        half: half a side, metres.
+    """
+    count, added = len(features), len(normals)
+    hulls = int(features.start[count])
+    leanest = np.eye(3)[np.abs(normals).argmin(axis=1)]
+    one = _units(leanest - (leanest * normals).sum(axis=1)[:, None] * normals)
+    other = np.cross(normals, one)
+    signs = ((1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0))
+    squares = middles[:, None] + half * np.stack([a * one + b * other for a, b in signs], axis=1)
+    corners = squares.reshape(-1, 3)
+    sizes = np.diff(features.start)
+    sides = np.full(added, 4)
+    pieces = int(features.first[-1]) + added
+    return Features(
+        normals=np.ascontiguousarray(np.vstack([features.normals, normals])),
+        offsets=np.concatenate([features.offsets, (normals * middles).sum(axis=1)]),
+        first=np.concatenate([features.first + added, pieces + 1 + np.arange(added)]),
+        start=np.cumsum([0, *sizes[:count], *sides, *sizes[count:], *sides]).astype(np.int64),
+        corners=np.ascontiguousarray(
+            np.concatenate([features.corners[:hulls], corners, features.corners[hulls:], corners])
+        ),
+        cone_start=np.concatenate(
+            [features.cone_start, features.cone_start[-1] + 1 + np.arange(added)]
+        ),
+        cone_normals=np.ascontiguousarray(np.vstack([features.cone_normals, normals])),
+        half_angles=np.concatenate([features.half_angles, np.zeros(added)]),
+        face_count=features.face_count,
+        edge_count=features.edge_count,
+    )
+
+
 def _gather(
     model: Polyhedron,
     edges: list[tuple[Floats, Floats]],
@@ -162,9 +200,11 @@ def convex_vertices(model: Polyhedron) -> list[tuple[Floats, Floats]]:
     """The convex vertices of a model: (1, 3) point and (k, 3) corners of its normal cone, each."""
     leaving: dict[int, set[int]] = {}
     touching: dict[int, set[int]] = {}
+    sides: dict[tuple[int, int], int] = {}
     for t, corners in enumerate(model.triangles):
         for k in range(3):
             a, b = int(corners[k]), int(corners[(k + 1) % 3])
+            sides[a, b] = int(model.triangle_faces[t])
             leaving.setdefault(a, set()).add(b)
             leaving.setdefault(b, set()).add(a)
             touching.setdefault(a, set()).add(int(model.triangle_faces[t]))
@@ -172,9 +212,19 @@ def convex_vertices(model: Polyhedron) -> list[tuple[Floats, Floats]]:
     for vertex, neighbours in leaving.items():
         if len(touching[vertex]) < 3:
             continue
-        lines = _units(model.vertices[sorted(neighbours)] - model.vertices[vertex])
+        ends = sorted(neighbours)
+        lines = _units(model.vertices[ends] - model.vertices[vertex])
         cone = _polar_cone(lines)
-        if len(cone) >= 3:
+        if len(cone) < 3:
+            continue
+        # A corner and the pocket that it would fill have the same lines; their edges turn
+        # differently. Those on the outline of the lines say which it is.
+        turns = [
+            np.cross(model.normals[sides[vertex, end]], model.normals[sides[end, vertex]]) @ line
+            for end, line in zip(ends, lines, strict=True)
+            if line @ cone[0] > -FLAT
+        ]
+        if max(turns, key=abs) > 0.0:
             found.append((model.vertices[[vertex]], cone))
     return found
 

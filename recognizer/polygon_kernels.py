@@ -11,7 +11,7 @@ INSIDE, EDGE, CORNER = 1, 2, 3
 
 @njit(cache=True)
 def nearest_in_polygon(x, normal, offset, corners, start, stop, nearest):
-    """The nearest point of a solid convex polygon, into ``nearest``.
+    """The nearest point of a solid convex polygon, or of a segment, into ``nearest``.
 
     Args:
         x: (3,) the point.
@@ -32,6 +32,8 @@ def nearest_in_polygon(x, normal, offset, corners, start, stop, nearest):
     best = np.inf
     region = INSIDE
     nearest[0], nearest[1], nearest[2] = y0, y1, y2
+    # Two corners are a segment: a point on its line isn't inside of anything.
+    segment = stop - start == 2
     last = stop - 1
     for k in range(start, stop):
         e0 = corners[k, 0] - corners[last, 0]
@@ -46,7 +48,7 @@ def nearest_in_polygon(x, normal, offset, corners, start, stop, nearest):
             + g1 * (e2 * normal[0] - e0 * normal[2])
             + g2 * (e0 * normal[1] - e1 * normal[0])
         )
-        if side > 0.0:
+        if side > 0.0 or segment:
             share = (g0 * e0 + g1 * e1 + g2 * e2) / (e0 * e0 + e1 * e1 + e2 * e2)
             touched = EDGE if 0.0 < share < 1.0 else CORNER
             share = min(max(share, 0.0), 1.0)

@@ -9,6 +9,7 @@ from .align_kernels import align, middle_translation
 from .fit_kernels import assemble_fit, fit_pose
 from .proof_kernels import locate, workspace
 from .reading_kernels import carry, read, worst_on_pieces
+from .region_kernels import turn_between
 from .search_pose_kernels import box_stack, search_poses
 from .verdict_kernels import BESIDE, EXACT, FEASIBLE, REJECTED, judge
 
@@ -21,9 +22,8 @@ FIT_STEPS = 20
 def finish(count, faces, contacts, model, rotation, translation, work, information):
     """The best fit near a witness, if that is a witness too; misfit and information of the pose."""
     points, measured = contacts[0], contacts[1]
-    readings, rows, systems, vectors, frames = work[0], work[3], work[4], work[5], work[6]
+    readings, rows, vectors, frames = work[0], work[3], work[5], work[6]
     x, u = rows[0], rows[1]
-    system, gradient = systems[0], vectors[0]
     fitted, shifted = frames[0], vectors[3]
     fitted[:] = rotation
     shifted[:] = translation
@@ -35,9 +35,17 @@ def finish(count, faces, contacts, model, rotation, translation, work, informati
     if worst <= 1.0 + EXACT:
         rotation[:] = fitted
         translation[:] = shifted
-    else:
-        carry(count, points, measured, rotation, translation, x, u)
-        read(count, faces, faces, x, u, model, contacts, readings)
+    return weigh(count, faces, contacts, model, rotation, translation, work, information)
+
+
+@njit(cache=True)
+def weigh(count, faces, contacts, model, rotation, translation, work, information):
+    """The least-squares misfit of a pose, and its information about small motions, in place."""
+    readings, rows = work[0], work[3]
+    x, u = rows[0], rows[1]
+    system, gradient = work[4][0], work[5][0]
+    carry(count, contacts[0], contacts[1], rotation, translation, x, u)
+    read(count, faces, faces, x, u, model, contacts, readings)
     cost = assemble_fit(True, count, faces, x, u, model, contacts, readings, system, gradient)
     assemble_fit(False, count, faces, x, u, model, contacts, readings, system, gradient)
     for a in range(6):
@@ -55,7 +63,7 @@ def start_pose(count, faces, contacts, model, half_angles, middles, rotation, tr
 
 
 @njit(cache=True)
-def settle(count, faces, contacts, model, angle, most, rotation, translation, work, stack):
+def settle(count, faces, contacts, model, ball, angle, most, rotation, translation, work, stack):
     """Judge an interpretation as far as a budget of boxes allows.
 
     Args:
@@ -63,18 +71,18 @@ def settle(count, faces, contacts, model, angle, most, rotation, translation, wo
         faces: (n,) the feature of each contact, -1 for none.
         contacts: see `search_kernels.search_model`.
         model: likewise.
-        angle: an angle from the starting rotation that no rotation within the bounds exceeds.
+        ball: (3, 3) a rotation, near the starting one, that none within the bounds is farther from
+            than ...
+        angle: ... this angle, radians. A smaller ball that comes to light replaces it in place.
         most: the most boxes to look at.
         rotation: (3, 3) object to world, moved in place.
         translation: (3,) likewise.
-        work: see `verdict_kernels.workspace`.
+        work: see `proof_kernels.workspace`.
         stack: see `search_pose_kernels.box_stack`.
 
     Returns:
         REJECTED, FEASIBLE or UNDECIDED, and how many boxes were looked at.
     """
-    ball = work[6][1]
-    ball[:] = rotation
     verdict, angle, _, _ = judge(
         count,
         faces,
@@ -93,6 +101,8 @@ def settle(count, faces, contacts, model, angle, most, rotation, translation, wo
         return verdict, 0
     if verdict == BESIDE:
         locate(count, faces, faces, model, contacts, rotation, ball, angle, work)
+    # The ball is not about the pose that the verdict left.
+    angle = min(np.pi, angle + turn_between(ball, rotation, np.empty(3)))
     return search_poses(
         count, faces, contacts, model, angle, most, rotation, translation, work, stack
     )
@@ -124,7 +134,7 @@ def test_interpretations(interpretations, contacts, model, half_angles, middles,
     work = workspace(count)
     stack = box_stack(count)
     faces = np.empty(count, np.int64)
-    rotation, translation = np.empty((3, 3)), np.empty(3)
+    rotation, translation, ball = np.empty((3, 3)), np.empty(3), np.empty((3, 3))
     for m in range(size):
         faces[:] = interpretations[m]
         verdicts[m] = REJECTED
@@ -133,11 +143,13 @@ def test_interpretations(interpretations, contacts, model, half_angles, middles,
         )
         if angle < 0.0:
             continue
+        ball[:] = rotation
         verdicts[m], looked = settle(
             count,
             faces,
             contacts,
             model,
+            ball,
             angle,
             min(most_boxes, pool),
             rotation,

@@ -20,11 +20,18 @@ ROUNDS = 5
 SHRINKS = 0.9
 PATIENCE = 2
 """Rounds go on until so many in a row have not shrunk the region below this share of its size."""
+SQUARES_ROUNDING = 1e-12
+"""What a sum of squares may lose, as a share of it: thousands of times what six of them do."""
+STIFF_ROUNDING = 2e-14
+"""What an inverse may lose, as a share, for each unit of its condition: a hundred roundings."""
 
 
 @njit(cache=True)
-def invert_symmetric(matrix, inverse, factor):
-    """Invert a positive definite (k, k) matrix by Cholesky; returns whether it is one."""
+def invert_symmetric(matrix, inverse, factor, slope, root):
+    """Invert a positive definite (k, k) matrix by Cholesky; returns whether it is one.
+
+    Also write ``L^-1 slope`` into (k,) ``root``, for the factor L, ``matrix = L L^T``.
+    """
     size = len(matrix)
     for a in range(size):
         for b in range(a + 1):
@@ -37,6 +44,12 @@ def invert_symmetric(matrix, inverse, factor):
                 factor[a, a] = np.sqrt(value)
             else:
                 factor[a, b] = value / factor[b, b]
+    # By substitution: a product with the inverse would lose what a stiff matrix has of digits.
+    for a in range(size):
+        value = slope[a]
+        for k in range(a):
+            value -= factor[a, k] * root[k]
+        root[a] = value / factor[a, a]
     # The factor's inverse, in place of its lower triangle.
     for a in range(size):
         factor[a, a] = 1.0 / factor[a, a]
@@ -393,18 +406,25 @@ def bound_region(
         slope[2] += p2
         steepness = np.sqrt(p0 * p0 + p1 * p1 + p2 * p2)
         allowed += square / 3.0 * steepness * result + square * square / 24.0 * misfit
-        if not invert_symmetric(system, trial, factor):
+        if not invert_symmetric(system, trial, factor, slope, middle):
             break
         # Complete the square about the centre.
+        squares, stiff, slack = 0.0, 0.0, 0.0
+        for a in range(6):
+            squares += middle[a] * middle[a]
+            stiff += system[a, a]
+            slack += trial[a, a]
+        # The centre itself, by the factor's inverse from the left; from below, in place.
         for a in range(6):
             value = 0.0
-            for b in range(6):
-                value -= trial[a, b] * slope[b]
+            for k in range(a, 6):
+                value -= factor[k, a] * middle[k]
             middle[a] = value
-        for a in range(6):
-            allowed -= slope[a] * middle[a]
+        # Sums lose digits to large squares, and the inverse to a stiff system: far less than this.
+        allowed += (1.0 + SQUARES_ROUNDING) * squares
         if allowed < 0.0:
             return -1.0, 0.0
+        allowed *= 1.0 + STIFF_ROUNDING * stiff * slack
         far = np.sqrt(middle[0] ** 2 + middle[1] ** 2 + middle[2] ** 2)
         near = np.sqrt(max(allowed * largest_eigenvalue(trial), 0.0))
         # (w . p)^2 <= (|c . p| + sqrt(p E p))^2 <= (1 + t) p E p + (1 + 1 / t) (c . p)^2.

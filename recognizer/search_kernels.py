@@ -29,6 +29,7 @@ VAGUE = 1.2
 INNER_STEPS = 2
 """Steps of a verdict within the tree, where it may stay open."""
 NODES, VERDICTS, INNER_REJECTED, BOXES, CUT, LEAVES_TRIED = 0, 1, 2, 3, 4, 5
+COUNTS = 6
 """Places of the counts that a search returns."""
 
 
@@ -49,6 +50,7 @@ def search_model(
     packed,
     prefixes,
     first_domain,
+    later_domain,
     spare,
     switches,
     crowd,
@@ -75,6 +77,7 @@ def search_model(
         packed: see `ranges.pack_tables`.
         prefixes: (m, k) interpretations of the first k contacts to extend; (1, 0) is the root.
         first_domain: (w,) bit set, the features that the first contact may be on.
+        later_domain: (w,) the same of all others.
         spare: how many contacts may be on none (-1).
         switches: bits, which constraints on pairs to apply.
         crowd: completions of a branch from which poses are asked within the tree.
@@ -112,7 +115,7 @@ def search_model(
     row, near, root = np.empty(6), np.empty(3), np.empty((3, 3))
     ball = work[6][1]
     nodes = np.zeros(n, np.int64)
-    counts = np.zeros(6, np.int64)
+    counts = np.zeros(COUNTS, np.int64)
     found = 0
     found_faces = np.empty((16, n), np.int32)
     found_turns = np.empty((16, 3, 3))
@@ -120,11 +123,8 @@ def search_model(
     found_costs = np.empty(16)
     found_informations = np.empty((16, 6, 6))
     found_proven = np.empty(16, np.bool_)
-    everything = np.zeros(words, np.uint64)
     between = np.empty((n, n, 3))
     facings = np.empty((n, 3))
-    for f in range(features):
-        everything[f >> 6] |= _ONE << np.uint64(f & 63)
     for turn in range(max(1, len(cells))):
         in_cell = len(cells) > 0
         if in_cell:
@@ -140,7 +140,7 @@ def search_model(
                         facings[j, a] += cells[turn, b, a] * contacts[1][j, b]
         for m in range(len(prefixes)):
             for j in range(n):
-                left[start, j] = everything
+                left[start, j] = later_domain
                 sizes[start, j] = features
             if start == 0:
                 left[0, 0] = first_domain
@@ -357,11 +357,13 @@ def search_model(
                     if same < found and found_proven[same]:
                         continue
                 counts[LEAVES_TRIED] += 1
+                ball[:] = rotation
                 verdict, looked = settle(
                     n,
                     faces,
                     contacts,
                     model,
+                    ball,
                     angle,
                     min(most_boxes, pool),
                     rotation,
