@@ -24,18 +24,21 @@ the truth for certain.
 from .belief import Belief, Search
 from .comparison import PoseDifference, pose_difference
 from .contacts import Contacts
+from .free_space import FreeSpace
 from .hypotheses import Hypothesis, PoseTolerance
 from .library import load_folder
 from .polygon import Polygon
 from .polyhedron import Polyhedron
 from .ranges import PairTables
 from .recognize import Recognizer, SearchLimits
+from .support import SupportPlane
 from .tree import Constraints
 
 __all__ = [
     "Belief",
     "Constraints",
     "Contacts",
+    "FreeSpace",
     "Hypothesis",
     "PairTables",
     "Polygon",
@@ -45,6 +48,7 @@ __all__ = [
     "Recognizer",
     "Search",
     "SearchLimits",
+    "SupportPlane",
     "load_folder",
     "pose_difference",
 ]

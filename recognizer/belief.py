@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .contacts import Contacts
+from .free_space import FreeSpace
 from .hypotheses import Hypothesis
+from .support import SupportPlane
 
 if TYPE_CHECKING:
     from .recognize import Recognizer
@@ -59,17 +61,22 @@ class Belief:
     """Who said so."""
     outliers: int = 0
     """How many contacts could have been on no object."""
+    free_space: FreeSpace = field(default_factory=FreeSpace.none)
+    """Where the object was known not to be."""
+    support: SupportPlane | None = None
+    """What it was known to lie on."""
 
-    def update(self, contacts: Contacts) -> Belief:
+    def update(self, contacts: Contacts, *, free_space: FreeSpace | None = None) -> Belief:
         """The belief after further contacts: the same as of all of them from the start.
 
         Args:
-            contacts: the new ones.
+            contacts: the new ones; there may be none.
+            free_space: further paths that the probe swept.
 
         Raises:
             ValueError: contacts of the plane for a library in space, or the other way round.
         """
-        return self.recognizer.extend(self, contacts)
+        return self.recognizer.extend(self, contacts, free_space=free_space)
 
     @property
     def complete(self) -> bool:

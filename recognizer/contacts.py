@@ -11,6 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 UNIT_NORMAL_TOLERANCE = 1e-3
 """How far from 1 the length of a given normal may be; text files round to four digits or so."""
 
+APPROACH_ERROR = 0.01
+"""How far off the direction of an approach may be, radians."""
+
 
 @dataclass(frozen=True, init=False, eq=False)
 class Contacts:
@@ -30,6 +33,9 @@ class Contacts:
     """(n,) radius of the ball around each position, metres."""
     normal_error: NDArray[np.float64]
     """(n,) half-angle of the cone around each normal, radians, at most pi (normal unknown)."""
+    approaches: NDArray[np.float64]
+    """(n, 3) or (n, 2) unit directions in which the probe moved when it touched, world frame,
+    within `APPROACH_ERROR`; rows of zeros where that is unknown. The surface faced it."""
 
     def __init__(
         self,
@@ -38,6 +44,7 @@ class Contacts:
         *,
         position_error: ArrayLike,
         normal_error: ArrayLike | None = None,
+        approaches: ArrayLike | None = None,
     ) -> None:
         """Check and hold contacts; every array is copied and made read-only.
 
@@ -48,6 +55,8 @@ class Contacts:
             position_error: bound on each position, metres; one number or (n,).
             normal_error: bound on each normal, radians; one number or (n,). Needed with normals;
                 where a normal is unknown it is pi, whatever is given.
+            approaches: unit directions in which the probe moved when it touched; rows of NaN or
+                zeros, or none at all, where that is unknown.
 
         Raises:
             ValueError: a shape that does not fit, a value that is not finite, a normal that is
@@ -89,6 +98,7 @@ class Contacts:
             directions / lengths[:, None],
             _bounds("position_error", position_error, count, np.inf),
             cones,
+            _approaches(approaches, points.shape),
         )
 
     def _hold(
@@ -97,10 +107,11 @@ class Contacts:
         normals: NDArray[np.float64],
         position_error: NDArray[np.float64],
         normal_error: NDArray[np.float64],
+        approaches: NDArray[np.float64],
     ) -> None:
         """Take over arrays that are known to be good."""
-        values = (positions, normals, position_error, normal_error)
-        names = ("positions", "normals", "position_error", "normal_error")
+        values = (positions, normals, position_error, normal_error, approaches)
+        names = ("positions", "normals", "position_error", "normal_error", "approaches")
         for name, value in zip(names, values, strict=True):
             value.setflags(write=False)
             object.__setattr__(self, name, value)
@@ -112,6 +123,30 @@ class Contacts:
     def dimension(self) -> int:
         """3 in space, 2 in the plane."""
         return self.positions.shape[1]
+
+    @property
+    def approach_known(self) -> NDArray[np.bool_]:
+        """(n,) whether the direction of the approach is known."""
+        return (self.approaches != 0.0).sum(axis=1) > 0
+
+    def facing_approach(self) -> Contacts:
+        """The same, with what an approach says of a normal where no better is known.
+
+        The surface faces the probe: its normal is within a right angle of where it came from.
+        """
+        half_space = np.pi / 2.0 + APPROACH_ERROR
+        vague = self.approach_known & (self.normal_error > half_space)
+        if not vague.any():
+            return self
+        part = object.__new__(Contacts)
+        part._hold(
+            self.positions,
+            np.where(vague[:, None], -self.approaches, self.normals),
+            self.position_error,
+            np.where(vague, half_space, self.normal_error),
+            self.approaches,
+        )
+        return part
 
     def __getitem__(self, rows: ArrayLike | slice) -> Contacts:
         """The contacts of the given rows (a slice, indices or a mask), in that order."""
@@ -125,6 +160,7 @@ class Contacts:
             np.ascontiguousarray(self.normals[index]),
             np.ascontiguousarray(self.position_error[index]),
             np.ascontiguousarray(self.normal_error[index]),
+            np.ascontiguousarray(self.approaches[index]),
         )
         return part
 
@@ -150,6 +186,7 @@ class Contacts:
             np.concatenate([part.normals for part in parts]),
             position_error=np.concatenate([part.position_error for part in parts]),
             normal_error=np.concatenate([part.normal_error for part in parts]),
+            approaches=np.concatenate([part.approaches for part in parts]),
         )
 
 
@@ -164,6 +201,25 @@ def _rows(name: str, values: ArrayLike, *, missing: bool = False) -> NDArray[np.
     if bad.size:
         raise ValueError(f"{name}: row {bad[0]} is {rows[bad[0]].tolist()}; it must be finite")
     return rows
+
+
+def _approaches(values: ArrayLike | None, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    if values is None:
+        return np.zeros(shape)
+    directions = _rows("approaches", values, missing=True)
+    if directions.shape != shape:
+        raise ValueError(
+            f"approaches have shape {directions.shape} but positions {shape}: give one a position"
+        )
+    directions[np.isnan(directions).all(axis=1)] = 0.0
+    lengths = np.linalg.norm(directions, axis=1)
+    off = np.flatnonzero((lengths > 0.0) & (np.abs(lengths - 1.0) > UNIT_NORMAL_TOLERANCE))
+    if off.size:
+        row = int(off[0])
+        raise ValueError(
+            f"approaches: row {row} has length {lengths[row]:.6g}; directions must be unit vectors"
+        )
+    return directions / np.where(lengths > 0.0, lengths, 1.0)[:, None]
 
 
 def _bounds(name: str, values: ArrayLike, count: int, largest: float) -> NDArray[np.float64]:

@@ -60,13 +60,15 @@ class Hypothesis:
     covariance: Floats
     """(6, 6) of the pose, in the same motions, square metres: a local approximation by the least
     squares of its best interpretation, with half a turn and half a diameter known beforehand."""
+    proven: bool = True
+    """Whether ``pose`` meets every bound; if not, no such pose was found and none excluded."""
 
     @cached_property
     def pose(self) -> RigidTransform:
         """Model to world; the best fit among its interpretations.
 
-        It is within every bound. Of poses that differ by a symmetry of the object only one is
-        reported.
+        It is within every bound if `proven`. Of poses that differ by a symmetry of the object only
+        one is reported.
         """
         return RigidTransform.from_matrix(self.T_world_object)
 
@@ -82,9 +84,11 @@ def cluster(
     """Group one object's poses into hypotheses.
 
     The weight of a group is the volume of poses it stands for: every pose within the bounds is
-    equally likely under noise uniform in them and a uniform prior. The volume is approximated
-    locally, by the error ellipsoid of the group's best-determined fit, cut to half a turn and half
-    a diameter along what is open; it counts once a symmetry of the object.
+    equally likely under noise uniform in them and a uniform prior. An interpretation's volume is
+    approximated locally, by the error ellipsoid of its fit, cut to half a turn and half a diameter
+    along what is open, times ``exp(-misfit / 2)``: what bounds leave shrinks as they are strained,
+    and a normal law of the readings' variances says by how much. Those of a group add up, once a
+    symmetry of the object.
 
     Args:
         model: the object.
@@ -107,6 +111,7 @@ def cluster(
     covariances = np.linalg.inv(poses.informations + prior)
     variances, motions = np.linalg.eigh(covariances)
     log_volumes = 0.5 * np.log(variances).sum(axis=1) + np.log(len(model.symmetries))
+    log_shares = log_volumes - 0.5 * poses.costs
     # Three standard deviations of each motion, against what the tolerance allows it: with bounded
     # noise hardly any fit is off by more.
     allowed = min(tolerance.rotation * radius, most_shift)
@@ -122,9 +127,10 @@ def cluster(
                 interpretations=poses.faces[members],
                 freedoms=motions[leader].T[open_motions],
                 covariance=covariances[leader].astype(float),
+                proven=bool(poses.proven[leader]),
             )
         )
-        log_weights[group] = log_volumes[members].max()
+        log_weights[group] = np.logaddexp.reduce(log_shares[members])
     return hypotheses, log_weights
 
 

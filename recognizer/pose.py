@@ -13,7 +13,8 @@ give it to tenths of a degree.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,6 +60,11 @@ class Poses:
             self.informations[rows],
             self.proven[rows],
         )
+
+    @classmethod
+    def join(cls, parts: Sequence[Poses]) -> Poses:
+        """The poses of all parts, at least one, in order."""
+        return cls(*(np.concatenate([getattr(p, f.name) for p in parts]) for f in fields(cls)))
 
 
 KernelContacts = tuple[Floats, Floats, Floats, Floats, Floats]

@@ -349,10 +349,12 @@ def workspace(count):
 def reach_of(model, contacts, pivot):
     """A shift of the contacts' mean that no pose within the bounds exceeds, metres.
 
-    At such a pose the mean is in the object's hull, up to the largest bound.
+    At such a pose each contact is on the object, up to its bound. What cuts add (see `cut_kernels`)
+    is no farther from the centroid than a contact and what was inside the object are apart, and
+    neither is a place of the support plane.
     """
     away = np.sqrt(((pivot - model[5]) ** 2).sum())
-    return 2.0 * model[6] + contacts[2].max() + away
+    return 8.0 * model[6] + 5.0 * contacts[2].max() + away
 
 
 @njit(cache=True)

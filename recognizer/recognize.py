@@ -14,12 +14,15 @@ from scipy.spatial.transform import RigidTransform
 from .belief import Belief, Search
 from .contacts import Contacts
 from .features import Features
+from .free_space import FreeSpace
 from .hypotheses import Hypothesis, PoseTolerance
 from .planar_recognize import PlanarEntry, search_polygon, span_polygon
 from .polygon import Polygon
 from .polyhedron import Polyhedron
 from .ranges import PairTables
 from .solid_recognize import SolidEntry, search_solid, span_solid
+from .support import SupportPlane
+from .surroundings import Surroundings
 from .tree import Constraints, spread_order
 from .tree_kernels import least_span
 
@@ -160,13 +163,22 @@ class Recognizer:
         known = ", ".join(entry.model.name for entry in (*self._solids, *self._outlines))
         raise ValueError(f"no model is called {name!r}; there are: {known}")
 
-    def recognize(self, contacts: Contacts, *, outliers: int = 0) -> Belief:
-        """Every (object, pose) that the contacts allow.
+    def recognize(
+        self,
+        contacts: Contacts,
+        *,
+        outliers: int = 0,
+        free_space: FreeSpace | None = None,
+        support: SupportPlane | None = None,
+    ) -> Belief:
+        """Every (object, pose) that the contacts allow, and what else is known.
 
         Args:
             contacts: at least one contact on the object.
             outliers: how many of them, at most, may be on no face of it (the null face of Grimson
                 and Lozano-Perez 1987); -1 stands for none in an interpretation.
+            free_space: paths that the probe swept without meeting the object, or until it did.
+            support: the plane that the object lies on.
 
         Returns:
             The belief; empty if no object of the library fits. Hypotheses with fewer outliers come
@@ -174,23 +186,34 @@ class Recognizer:
 
         Raises:
             ValueError: no contacts, contacts of the plane for a library of solids or the other way
-                round, outliers below zero or in the plane.
+                round, outliers below zero or in the plane, free space or a support in the plane.
         """
         if not len(contacts):
             raise ValueError("no contacts: before the first touch every object and pose fits")
         self._check(contacts, outliers)
-        return self._believe(contacts, spread_order(contacts), outliers, None)
+        if self.dimension == 2 and (free_space is not None or support is not None):
+            raise ValueError("free space and support are for solids, not for outlines of the plane")
+        known = Surroundings.of(free_space, support)
+        return self._believe(contacts, spread_order(contacts), outliers, known, None)
 
-    def extend(self, belief: Belief, contacts: Contacts) -> Belief:
+    def extend(
+        self, belief: Belief, contacts: Contacts, *, free_space: FreeSpace | None = None
+    ) -> Belief:
         """The belief after further contacts; see `Belief.update`."""
         self._check(contacts, belief.outliers)
-        known = len(belief.contacts)
+        first = len(belief.contacts)
         everything = Contacts.join([belief.contacts, contacts])
+        if self.dimension == 2:
+            return self.recognize(everything, free_space=free_space)
+        paths = FreeSpace.join([belief.free_space, free_space or FreeSpace.none()])
+        known = Surroundings.of(paths, belief.support)
         # Without outliers an interpretation of all contacts is one of the first ones, extended.
-        if self.dimension == 2 or belief.outliers or not belief.complete:
-            return self.recognize(everything, outliers=belief.outliers)
-        order = np.concatenate([np.arange(known), known + spread_order(contacts)])
-        return self._believe(everything, order, belief.outliers, belief)
+        extends = belief.complete and not belief.outliers and len(contacts) > 0
+        if not extends or (belief.support is not None and belief.support.resting):
+            order = spread_order(everything)
+            return self._believe(everything, order, belief.outliers, known, None)
+        order = np.concatenate([np.arange(first), first + spread_order(contacts)])
+        return self._believe(everything, order, belief.outliers, known, belief)
 
     def _check(self, contacts: Contacts, outliers: int) -> None:
         if contacts.dimension != self.dimension:
@@ -205,10 +228,15 @@ class Recognizer:
             raise ValueError("outliers are not supported for outlines of the plane")
 
     def _believe(
-        self, contacts: Contacts, order: NDArray[np.intp], outliers: int, before: Belief | None
+        self,
+        contacts: Contacts,
+        order: NDArray[np.intp],
+        outliers: int,
+        known: Surroundings,
+        before: Belief | None,
     ) -> Belief:
         back = np.argsort(order)
-        ordered = contacts[order]
+        ordered = contacts[order].facing_approach()
         span = least_span(ordered.positions, ordered.position_error) if outliers == 0 else 0.0
         hypotheses: list[Hypothesis] = []
         logs, searches = [], []
@@ -228,6 +256,7 @@ class Recognizer:
                 self.limits,
                 outliers=outliers,
                 prefixes=_interpretations(before, entry.model.name),
+                surroundings=known,
             )
             _note(found, hypotheses, logs, searches)
         weights = _normalised(np.concatenate(logs) if logs else np.zeros(0))
@@ -240,7 +269,15 @@ class Recognizer:
             )
             for index in np.lexsort((-weights, nulls))
         ]
-        return Belief(tuple(ranked), tuple(searches), contacts, self, outliers)
+        return Belief(
+            tuple(ranked),
+            tuple(searches),
+            contacts,
+            self,
+            outliers,
+            known.free_space,
+            known.support,
+        )
 
 
 def _note(

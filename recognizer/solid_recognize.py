@@ -6,7 +6,7 @@ search, see `search_kernels`.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from pathlib import Path
 from time import perf_counter
@@ -19,10 +19,12 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from . import search_kernels
 from .belief import Search
 from .contacts import Contacts
-from .features import Features, all_features, face_features
+from .features import Features, all_features, face_features, with_squares
 from .hypotheses import Hypothesis, PoseTolerance, cluster
 from .pose import ModelTest, Poses, kernel_contacts
 from .ranges import PairTables, pack_tables
+from .support import FOOTING, StableFace, stable_faces
+from .surroundings import Surroundings, clear
 from .symmetry import feature_permutations
 from .table_cache import cached_tables
 from .tree import Constraints
@@ -84,6 +86,26 @@ class SolidEntry:
             np.unique(self.permutations[0].min(axis=0)), count
         )
 
+    @cached_property
+    def stable_faces(self) -> list[StableFace]:
+        """The faces of its convex hull that the solid can stand on."""
+        return stable_faces(self.model)
+
+    @cached_property
+    def standing(self) -> SolidEntry:
+        """The same with these faces' planes among the features, behind all others."""
+        faces, model = self.stable_faces, self.model
+        normals = np.array([face.normal for face in faces])
+        heights = np.array([face.offset for face in faces]) - normals @ model.centroid
+        features = with_squares(
+            self.features,
+            normals,
+            model.centroid + heights[:, None] * normals,
+            FOOTING * model.diameter,
+        )
+        tables = PairTables.of(model, features)
+        return SolidEntry(model, features, tables, ModelTest(model, features), pack_tables(tables))
+
 
 def search_solid(
     entry: SolidEntry,
@@ -94,6 +116,7 @@ def search_solid(
     *,
     outliers: int = 0,
     prefixes: NDArray[np.int32] | None = None,
+    surroundings: Surroundings | None = None,
 ) -> tuple[list[Hypothesis], NDArray[np.float64], Search]:
     """The search and its groups of poses, for one solid.
 
@@ -105,38 +128,42 @@ def search_solid(
         limits: how far the search goes.
         outliers: how many contacts may lie on no feature.
         prefixes: (m, k) all interpretations of the first k contacts, if known.
+        surroundings: what else is known.
 
     Returns:
         Hypotheses; (h,) the logarithms of their weights, not yet normalised; and what was done.
     """
     started = perf_counter()
-    smallest = float(contacts.position_error.min())
-    everything, orbits = entry.roots
-    permutations, missed = entry.permutations
-    symmetric = (
-        prefixes is None
-        and len(permutations) > 1
-        and missed < EXACT_SYMMETRY * smallest
-        and outliers == 0
-    )
-    poses, nodes, counts = _search(
-        entry,
-        contacts,
-        constraints,
-        limits,
-        outliers,
-        np.zeros((1, 0), np.int32) if prefixes is None else prefixes,
-        orbits if symmetric else everything,
-    )
-    if symmetric:
-        poses = _spread_over_symmetries(entry.model, poses, permutations)
+    surroundings = surroundings or Surroundings.of(None, None)
+    settings = (constraints, limits, outliers)
+    copies = 1
+    if surroundings.support is not None and surroundings.support.resting:
+        poses, nodes, counts = _search_standing(entry, contacts, surroundings, *settings)
+    else:
+        smallest = float(contacts.position_error.min())
+        permutations, missed = entry.permutations
+        symmetric = (
+            prefixes is None
+            and len(permutations) > 1
+            and missed < EXACT_SYMMETRY * smallest
+            and outliers == 0
+        )
+        everything, orbits = entry.roots
+        start = np.zeros((1, 0), np.int32) if prefixes is None else prefixes
+        roots = (orbits if symmetric else everything, everything)
+        poses, nodes, counts = _search(entry, contacts, *settings, start, roots)
+        if not surroundings.says_nothing(contacts):
+            poses = clear(entry.model, entry.features, poses, contacts, surroundings)
+        if symmetric:
+            copies = len(permutations)
+            poses = _spread_over_symmetries(entry.model, poses, permutations)
     searched = perf_counter()
     largest = float(contacts.position_error.max())
     hypotheses, log_weights = cluster(entry.model, poses, tolerance, largest)
     search = Search(
         object_name=entry.model.name,
         nodes=nodes,
-        pruned=int(counts[search_kernels.LEAVES_TRIED]) * (len(permutations) if symmetric else 1),
+        pruned=int(counts[search_kernels.LEAVES_TRIED]) * copies,
         tested=len(poses),
         hypotheses=len(hypotheses),
         complete=not counts[search_kernels.CUT],
@@ -154,7 +181,7 @@ def _search(
     limits: SearchLimits,
     outliers: int,
     prefixes: NDArray[np.int32],
-    root: NDArray[np.uint64],
+    roots: Roots,
 ) -> tuple[Poses, NDArray[np.int64], NDArray[np.int64]]:
     test = entry.test
     *found, nodes, counts = search_kernels.search_model(
@@ -165,7 +192,7 @@ def _search(
         test.middles,
         entry.packed,
         prefixes,
-        root,
+        *roots,
         outliers,
         constraints.bits,
         float(limits.crowd),
@@ -176,6 +203,62 @@ def _search(
         *(rotation_cells() if _vague(contacts) else NO_CELLS),
     )
     return Poses(*found), nodes, counts
+
+
+def _search_standing(
+    entry: SolidEntry,
+    contacts: Contacts,
+    surroundings: Surroundings,
+    constraints: Constraints,
+    limits: SearchLimits,
+    outliers: int,
+) -> tuple[Poses, NDArray[np.int64], NDArray[np.int64]]:
+    """The search of a solid that stands on a face of its hull: each such face in its turn.
+
+    The support is one more contact, on that face.
+    """
+    support = surroundings.support
+    assert support is not None
+    standing = entry.standing
+    count, size = len(entry.features), len(standing.features)
+    later = _bits(np.arange(count), size)
+    parts: list[Poses] = []
+    nodes = np.zeros(len(contacts), np.int64)
+    counts = np.zeros(search_kernels.COUNTS, np.int64)
+    start = np.zeros((1, 0), np.int32)
+    for index, face in enumerate(entry.stable_faces):
+        touch = support.touch(face, entry.model.diameter, contacts, outliers)
+        if touch is None:
+            # Bounds so wide that standing says nothing more than the plane itself.
+            return _search_vague(entry, contacts, surroundings, constraints, limits, outliers)
+        everything = Contacts.join([touch, contacts])
+        roots = (_bits(np.array([count + index]), size), later)
+        poses, some_nodes, some_counts = _search(
+            standing, everything, constraints, limits, outliers, start, roots
+        )
+        poses = poses.take(poses.faces[:, 0] >= 0)
+        poses = clear(entry.model, standing.features, poses, everything, surroundings, face)
+        parts.append(replace(poses, faces=np.ascontiguousarray(poses.faces[:, 1:])))
+        nodes += some_nodes[1:]
+        counts += some_counts
+    return Poses.join(parts), nodes, counts
+
+
+def _search_vague(
+    entry: SolidEntry,
+    contacts: Contacts,
+    surroundings: Surroundings,
+    constraints: Constraints,
+    limits: SearchLimits,
+    outliers: int,
+) -> tuple[Poses, NDArray[np.int64], NDArray[np.int64]]:
+    """The search of a solid above a plane."""
+    everything = entry.roots[0]
+    start = np.zeros((1, 0), np.int32)
+    poses, nodes, counts = _search(
+        entry, contacts, constraints, limits, outliers, start, (everything, everything)
+    )
+    return clear(entry.model, entry.features, poses, contacts, surroundings), nodes, counts
 
 
 def _vague(contacts: Contacts) -> bool:

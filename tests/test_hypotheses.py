@@ -166,14 +166,15 @@ def test_a_tolerance_that_is_not_above_zero_is_refused(name: str, value: float) 
 def test_a_pose_that_is_known_worse_weighs_more() -> None:
     poses = placed(WEDGE, [turn(0.0), turn(1.0)])
     poses.informations[1] /= 4.0  # twice the spread in six freedoms
+    poses.costs[:] = 0.0
     _, logs = cluster(WEDGE, poses, TOLERANCE, 1e-5)
     assert logs[1] - logs[0] == pytest.approx(6.0 * np.log(2.0), rel=1e-3)
 
 
-def test_more_interpretations_of_one_pose_do_not_add_weight() -> None:
+def test_the_interpretations_of_a_pose_add_up_each_by_how_well_it_fits() -> None:
     poses = placed(WEDGE, [turn(0.0), turn(1.0), turn(1.001), turn(1.002)])
     _, logs = cluster(WEDGE, poses, TOLERANCE, 1e-5)
-    assert logs[0] == pytest.approx(logs[1])
+    assert logs[1] - logs[0] == pytest.approx(np.log(np.exp([-0.5, -1.0, -1.5]).sum()))
 
 
 def test_a_pose_counts_once_for_every_symmetry() -> None:
