@@ -13,6 +13,7 @@ from numba import njit
 
 from .align_kernels import middle_translation
 from .cell_kernels import facing, narrow_in_cell
+from .cell_search_kernels import passing_cells, view_cell
 from .mask_kernels import bit_index, narrow, pair_readings
 from .pose_kernels import finish, settle, start_pose
 from .possible_kernels import possible
@@ -58,8 +59,8 @@ def search_model(
     most_leaves,
     most_boxes,
     pool,
-    cells,
-    cell_angle,
+    finest,
+    most_cells,
 ):
     """All interpretations that some pose allows, each with such a pose.
 
@@ -85,9 +86,9 @@ def search_model(
         most_leaves: budget of interpretations.
         most_boxes: the most boxes of rotations to look at for a leaf.
         pool: the same for all leaves together.
-        cells: (c, 3, 3) rotations, object to world, to search around one by one; none, and the
-            normals have to say where to look.
-        cell_angle: an angle within which each rotation is from some cell's.
+        finest: the angle of cells of rotations to search one by one, radians; none if it is zero,
+            and the normals have to say where to look.
+        most_cells: the most cells to look at on the way there.
 
     Returns:
         (m, n) interpretations; (m, 3, 3) rotations, (m, 3) translations, (m,) least-squares
@@ -125,19 +126,27 @@ def search_model(
     found_proven = np.empty(16, np.bool_)
     between = np.empty((n, n, 3))
     facings = np.empty((n, 3))
-    for turn in range(max(1, len(cells))):
-        in_cell = len(cells) > 0
+    in_cell = finest > 0.0
+    cells, cell_angles = np.empty((1, 3, 3)), np.zeros(1)
+    if in_cell:
+        cells, cell_angles = passing_cells(
+            contacts,
+            errors,
+            model,
+            half_angles,
+            packed,
+            first_domain,
+            later_domain,
+            spare,
+            switches,
+            readings,
+            finest,
+            most_cells,
+        )
+    for turn in range(len(cells)):
+        cell_angle = cell_angles[turn]
         if in_cell:
-            for j in range(n):
-                for i in range(j):
-                    for a in range(3):
-                        between[i, j, a] = 0.0
-                        for b in range(3):
-                            between[i, j, a] += cells[turn, b, a] * (points[j, b] - points[i, b])
-                for a in range(3):
-                    facings[j, a] = 0.0
-                    for b in range(3):
-                        facings[j, a] += cells[turn, b, a] * contacts[1][j, b]
+            view_cell(cells[turn], points, contacts[1], between, facings)
         for m in range(len(prefixes)):
             for j in range(n):
                 left[start, j] = later_domain

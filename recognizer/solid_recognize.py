@@ -7,14 +7,14 @@ search, see `search_kernels`.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cache, cached_property
+from functools import cached_property
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import RigidTransform, Rotation
+from scipy.spatial.transform import RigidTransform
 
 from . import search_kernels
 from .belief import Search
@@ -37,11 +37,14 @@ EXACT_SYMMETRY = 1e-7
 """How far a symmetry may miss, as a share of the smallest bound on a position, to stand for a part
 of the search: what it misses is then below what a witness may miss a bound by."""
 
-CELLS = 16
-"""Cells across half a turn to either side."""
+FINENESS = 4.0
+"""Angle of the finest cells of rotations, in bounds on positions over the solid's radius, ..."""
+CELL_ANGLES = (0.04, 0.4)
+"""... and its least and largest, radians."""
+MOST_CELLS = 200_000
+"""Cells to look at on the way there."""
 
 Floats = NDArray[np.float64]
-NO_CELLS: tuple[Floats, float] = (np.zeros((0, 3, 3)), 0.0)
 Roots = tuple[NDArray[np.uint64], NDArray[np.uint64]]
 
 
@@ -200,7 +203,8 @@ def _search(
         limits.budget,
         test.boxes,
         test.pool,
-        *(rotation_cells() if _vague(contacts) else NO_CELLS),
+        _finest(contacts, test.radius),
+        MOST_CELLS,
     )
     return Poses(*found), nodes, counts
 
@@ -266,22 +270,15 @@ def _vague(contacts: Contacts) -> bool:
     return int(np.count_nonzero(contacts.normal_error < np.pi / 2.0)) < 2
 
 
-@cache
-def rotation_cells() -> tuple[Floats, float]:
-    """Rotations that every rotation is close to, and how close.
+def _finest(contacts: Contacts, radius: float) -> float:
+    """The angle of cells of rotations worth searching one by one, radians; zero if none are.
 
-    Rotation vectors fill a ball of radius pi; the middles of the cubes of a grid on it do, as two
-    turns are no farther apart than their vectors.
-
-    Returns:
-        (c, 3, 3) rotations and an angle, radians.
+    In a finer one the contacts turn by no more than they are off anyway.
     """
-    half = np.pi / CELLS
-    line = np.linspace(-np.pi + half, np.pi - half, CELLS)
-    middles = np.stack(np.meshgrid(line, line, line), axis=-1).reshape(-1, 3)
-    nearest = np.linalg.norm(np.maximum(np.abs(middles) - half, 0.0), axis=1)
-    rotations = Rotation.from_rotvec(middles[nearest < np.pi]).as_matrix()
-    return np.ascontiguousarray(rotations), float(np.sqrt(3.0) * half) + 1e-9
+    if not _vague(contacts):
+        return 0.0
+    smallest = float(contacts.position_error.min())
+    return float(np.clip(FINENESS * smallest / radius, *CELL_ANGLES))
 
 
 def _spread_over_symmetries(

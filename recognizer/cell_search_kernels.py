@@ -1,0 +1,235 @@
+"""Compiled search for the cells of rotations in which some interpretation passes all pairs.
+
+Cells are cut finer where they pass, down to an angle at which a contact can't turn far against its
+bound. A cell is dropped only if the tree of pairs, grown in it, has no leaf: any pose within the
+bounds whose rotation is in the cell would have its interpretation there.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from .cell_kernels import facing, narrow_in_cell
+from .mask_kernels import bit_index, narrow
+
+_ONE = np.uint64(1)
+_NONE = np.uint64(0)
+TRIES = 400
+"""Branches after which a cell passes without an answer."""
+
+
+@njit(cache=True)
+def rotation_of(vector, rotation):
+    """The rotation (3, 3) of a rotation vector (3,), in place (Rodrigues)."""
+    angle = np.sqrt((vector**2).sum())
+    first = np.sin(angle) / angle if angle > 1e-9 else 1.0
+    second = (1.0 - np.cos(angle)) / (angle * angle) if angle > 1e-6 else 0.5
+    x, y, z = vector
+    square = angle * angle
+    rotation[0, 0] = 1.0 - second * (square - x * x)
+    rotation[1, 1] = 1.0 - second * (square - y * y)
+    rotation[2, 2] = 1.0 - second * (square - z * z)
+    rotation[0, 1], rotation[1, 0] = second * x * y - first * z, second * x * y + first * z
+    rotation[0, 2], rotation[2, 0] = second * x * z + first * y, second * x * z - first * y
+    rotation[1, 2], rotation[2, 1] = second * y * z - first * x, second * y * z + first * x
+
+
+@njit(cache=True)
+def view_cell(rotation, points, normals, between, facings):
+    """Vectors between contacts (n, n, 3), i < j, and normals (n, 3) in a cell's own frame."""
+    for j in range(len(points)):
+        for a in range(3):
+            facings[j, a] = 0.0
+            for b in range(3):
+                facings[j, a] += rotation[b, a] * normals[j, b]
+        for i in range(j):
+            for a in range(3):
+                between[i, j, a] = 0.0
+                for b in range(3):
+                    between[i, j, a] += rotation[b, a] * (points[j, b] - points[i, b])
+
+
+@njit(cache=True)
+def _passes(
+    contacts,
+    errors,
+    model,
+    half_angles,
+    packed,
+    first_domain,
+    later_domain,
+    spare,
+    switches,
+    readings,
+    angle,
+    between,
+    facings,
+    space,
+):
+    """Whether some interpretation passes all pairs in a cell, or none was excluded in time."""
+    left, sizes, untried, faces, nulls, near = space
+    n, words = len(contacts[0]), len(later_domain)
+    lost = 0
+    for j in range(n):
+        left[0, j] = first_domain if j == 0 else later_domain
+        sizes[0, j] = facing(
+            facings[j], contacts[3][j], contacts[4][j], angle, model, left[0, j], near
+        )
+        lost += sizes[0, j] == 0
+    if lost > spare:
+        return False
+    level, tries = 0, 0
+    untried[0] = left[0, 0]
+    nulls[0] = 0
+    null_left = np.zeros(n, np.bool_)
+    null_left[0] = spare > 0
+    while level >= 0:
+        face = -1
+        for w in range(words):
+            bits = untried[level, w]
+            if bits != _NONE:
+                lowest = bits & (~bits + _ONE)
+                untried[level, w] = bits ^ lowest
+                face = w * 64 + bit_index(lowest)
+                break
+        if face < 0:
+            if not null_left[level]:
+                level -= 1
+                continue
+            null_left[level] = False
+        faces[level] = face
+        depth = level + 1
+        nulls[depth] = nulls[level] + (face < 0)
+        tries += 1
+        if tries > TRIES:
+            return True
+        empty = 0
+        for j in range(depth, n):
+            some = sizes[level, j]
+            if face < 0:
+                left[depth, j] = left[level, j]
+            else:
+                some = narrow(
+                    face,
+                    packed,
+                    half_angles[face],
+                    readings[level, j],
+                    errors[level],
+                    errors[j],
+                    switches,
+                    left[level, j],
+                    left[depth, j],
+                )
+                if some:
+                    some = narrow_in_cell(
+                        face,
+                        packed,
+                        half_angles,
+                        model[0],
+                        between[level, j],
+                        readings[level, j, 4],
+                        angle,
+                        left[depth, j],
+                    )
+            sizes[depth, j] = some
+            empty += some == 0
+            if nulls[depth] + empty > spare:
+                break
+        if nulls[depth] + empty > spare:
+            continue
+        if depth == n:
+            return True
+        level = depth
+        untried[level] = left[level, level]
+        null_left[level] = nulls[level] < spare
+    return False
+
+
+@njit(cache=True)
+def passing_cells(
+    contacts,
+    errors,
+    model,
+    half_angles,
+    packed,
+    first_domain,
+    later_domain,
+    spare,
+    switches,
+    readings,
+    finest,
+    most,
+):
+    """Cells of rotations that together hold those of all poses within the bounds.
+
+    Args:
+        contacts: see `search_kernels.search_model`, as are those that follow.
+        readings: (n, n, 9) see `mask_kernels.pair_readings`.
+        finest: an angle, radians; cells of less are not cut further.
+        most: cells to look at; then what is left is not cut further.
+
+    Returns:
+        (c, 3, 3) rotations, object to world, and (c,) angles: each rotation of a cell is within it.
+    """
+    n, features, words = len(contacts[0]), packed.shape[2], len(later_domain)
+    space = (
+        np.zeros((n + 1, n, words), np.uint64),
+        np.full((n + 1, n), features),
+        np.zeros((n, words), np.uint64),
+        np.full(n, -1, np.int64),
+        np.zeros(n + 1, np.int64),
+        np.empty(3),
+    )
+    between, facings, rotation = np.empty((n, n, 3)), np.empty((n, 3)), np.empty((3, 3))
+    # Breadth first, so that a budget ends on cells of one size.
+    middles, half = np.zeros((1, 3)), np.pi
+    looked = 0
+    passed = 1
+    while True:
+        angle = np.sqrt(3.0) * half
+        if angle <= finest or looked + 8 * passed > most:
+            break
+        half *= 0.5
+        angle = np.sqrt(3.0) * half + 1e-9
+        cut = np.empty((8 * passed, 3))
+        kept = 0
+        for p in range(passed):
+            for corner in range(8):
+                nearest = 0.0
+                for k in range(3):
+                    side = half if (corner >> k) & 1 else -half
+                    cut[kept, k] = middles[p, k] + side
+                    nearest += max(abs(cut[kept, k]) - half, 0.0) ** 2
+                # Rotation vectors fill a ball of radius pi.
+                if nearest > np.pi**2:
+                    continue
+                looked += 1
+                if angle < np.pi:
+                    rotation_of(cut[kept], rotation)
+                    view_cell(rotation, contacts[0], contacts[1], between, facings)
+                    if not _passes(
+                        contacts,
+                        errors,
+                        model,
+                        half_angles,
+                        packed,
+                        first_domain,
+                        later_domain,
+                        spare,
+                        switches,
+                        readings,
+                        angle,
+                        between,
+                        facings,
+                        space,
+                    ):
+                        continue
+                kept += 1
+        middles, passed = cut[:kept].copy(), kept
+        if passed == 0:
+            break
+    rotations = np.empty((passed, 3, 3))
+    for p in range(passed):
+        rotation_of(middles[p], rotations[p])
+    return rotations, np.full(passed, min(np.sqrt(3.0) * half + 1e-9, np.pi))
