@@ -27,7 +27,7 @@ help:
 	@echo "  make test       run the tests"
 	@echo "  make check      format, lint, types, and the wheel tried outside the repository"
 	@echo "  make bench      measure the recogniser's speed and accuracy"
-	@echo "  make soundness  run the long randomised campaigns: is the true pose ever lost?"
+	@echo "  make soundness  try 20,000 random cases and more: is the true pose ever lost?"
 	@echo "  make format     format the code and repair what lint can repair"
 	@echo "  make assets     rebuild the object library"
 	@echo "  make clean      remove .venv and everything built"
@@ -79,8 +79,8 @@ bench: $(DEV) $(COMPILED)
 	@$(BIN)/python -m palpate.scripts.bench $(ARGS)
 
 soundness: $(DEV) $(COMPILED)
-	@$(BIN)/python -m palpate.scripts.soundness
-	@$(BIN)/pytest -n auto --maxprocesses 8 -m slow $(ARGS)
+	@$(BIN)/python -m palpate.scripts.soundness $(ARGS)
+	@$(BIN)/pytest -n auto --maxprocesses 8 -m slow
 
 format: $(DEV)
 	@$(BIN)/ruff check --fix --quiet . || true
@@ -118,7 +118,7 @@ $(DEV): pyproject.toml $(CREATED)
 # numba looks only at a kernel's own file to see whether its compiled code is stale, not at the
 # kernels it calls: so all are compiled anew when any has changed.
 $(COMPILED): $(wildcard recognizer/*_kernels.py) $(RUNTIME)
-	@echo "set-up: compiling the recogniser's kernels (once; under a minute)"
+	@echo "set-up: compiling the recogniser's kernels (once; two minutes or so)"
 	@rm -f recognizer/__pycache__/*_kernels.*.nb[ci]
 	@$(BIN)/python -m palpate.recognizer.warm_up
 	@touch $@

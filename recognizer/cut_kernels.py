@@ -408,6 +408,9 @@ def clear_poses(
         if not proven[m]:
             continue
         faces[:count] = interpretations[m]
+        if faces[:count].max() < 0:
+            # On no contact at all, the object may be anywhere: nothing bounds how far.
+            continue
         contacts[2][count:] = 1e-12
         rotation[:], translation[:] = rotations[m], translations[m]
         anchor_angle = align(count, faces, model, half_angles, contacts, anchor)

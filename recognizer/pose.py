@@ -73,10 +73,11 @@ KernelContacts = tuple[Floats, Floats, Floats, Floats, Floats]
 def kernel_contacts(contacts: Contacts) -> KernelContacts:
     """Contacts as the kernels read them: see `search_kernels.search_model`."""
     errors = contacts.normal_error
+    # Copies: the kernels would be compiled again for arrays that can't be written.
     return (
-        contacts.positions,
-        contacts.normals,
-        contacts.position_error,
+        contacts.positions.copy(),
+        contacts.normals.copy(),
+        contacts.position_error.copy(),
         2.0 * np.sin(0.5 * errors),
         np.sin(np.minimum(errors, np.pi / 2.0)),
     )

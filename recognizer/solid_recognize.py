@@ -230,11 +230,20 @@ def _search_standing(
     nodes = np.zeros(len(contacts), np.int64)
     counts = np.zeros(search_kernels.COUNTS, np.int64)
     start = np.zeros((1, 0), np.int32)
+    plain: Poses | None = None
     for index, face in enumerate(entry.stable_faces):
         touch = support.touch(face, entry.model.diameter, contacts, outliers)
         if touch is None:
-            # Bounds so wide that standing says nothing more than the plane itself.
-            return _search_vague(entry, contacts, surroundings, constraints, limits, outliers)
+            # Bounds so wide that the face's plane, as a contact, says nothing: only the pose does.
+            if plain is None:
+                roots = (entry.roots[0], entry.roots[0])
+                plain, some_nodes, some_counts = _search(
+                    entry, contacts, constraints, limits, outliers, start, roots
+                )
+                nodes += some_nodes
+                counts += some_counts
+            parts.append(clear(entry.model, entry.features, plain, contacts, surroundings, face))
+            continue
         everything = Contacts.join([touch, contacts])
         roots = (_bits(np.array([count + index]), size), later)
         poses, some_nodes, some_counts = _search(
@@ -246,23 +255,6 @@ def _search_standing(
         nodes += some_nodes[1:]
         counts += some_counts
     return Poses.join(parts), nodes, counts
-
-
-def _search_vague(
-    entry: SolidEntry,
-    contacts: Contacts,
-    surroundings: Surroundings,
-    constraints: Constraints,
-    limits: SearchLimits,
-    outliers: int,
-) -> tuple[Poses, NDArray[np.int64], NDArray[np.int64]]:
-    """The search of a solid above a plane."""
-    everything = entry.roots[0]
-    start = np.zeros((1, 0), np.int32)
-    poses, nodes, counts = _search(
-        entry, contacts, constraints, limits, outliers, start, (everything, everything)
-    )
-    return clear(entry.model, entry.features, poses, contacts, surroundings), nodes, counts
 
 
 def _vague(contacts: Contacts) -> bool:

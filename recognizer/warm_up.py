@@ -11,11 +11,13 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform
 
 from .contacts import Contacts
+from .free_space import FreeSpace
 from .polygon import Polygon
 from .polyhedron import Polyhedron
 from .rays import cast_rays
 from .recognize import Recognizer
-from .tree import prune
+from .support import SupportPlane
+from .tree import Constraints, prune
 
 
 def warm_up() -> None:
@@ -29,7 +31,11 @@ def warm_up() -> None:
     )
     recognizer = Recognizer([box])
     recognizer.recognize(contacts).update(contacts)
+    paths = FreeSpace(5.0 * np.eye(3), hits.points_world, error=0.01)
+    floor = SupportPlane(height=-1.5, error=0.01, resting=True)
+    recognizer.recognize(contacts, free_space=paths, support=floor)
     prune(recognizer.tables("box"), contacts)
+    prune(recognizer.tables("box"), contacts, constraints=Constraints(triple=True, area=True))
     square = Polygon.from_corners([(0.0, 0.0), (1.0, 0.0), (1.0, 2.0), (0.0, 2.0)], name="square")
     flat = Contacts([(0.5, 0.0)], [(0.0, -1.0)], position_error=0.01, normal_error=0.1)
     Recognizer([square]).recognize(flat)

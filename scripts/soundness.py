@@ -1,150 +1,226 @@
-"""Play many episodes and count what a user cares about: is the truth ever lost?
+"""Try to lose the truth: `make soundness`, or `python -m palpate.scripts.soundness`.
 
-`make soundness`, or `python -m palpate.scripts.soundness [EPISODES]`: that many episodes an object
-(100 by default), with random probes, at 0.01 in and pi/10, at most 40 probes each.
+First random cases, see `soundness_cases`: in each the true interpretation is to be among those of
+some hypothesis, and every pose that is called proven is to meet every bound, as `soundness_check`
+finds without palpate's own geometry. Then whole episodes, see `soundness_episodes`.
 """
 
 from __future__ import annotations
 
+import argparse
 import os
 import sys
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass
-from functools import cache
-from time import perf_counter
+from typing import TYPE_CHECKING, Any, TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
+from .bench import keep_to_one_thread
 
-from ..assets import STAND_IN_NAMES
-from ..envs.probe_env import ProbeEnv
-from ..envs.scene import OBJECT
-from ..policies import make_policy
-from ..recognizer import pose_difference
-from ..recognizer.rays import cast_rays
-
-NEAR_ROTATION = np.radians(3.0)
-NEAR_TRANSLATION = 0.01
-"""How near (radians; share of the diameter) a pose that the contacts fix has to be to the truth:
-the recogniser's own tolerance for one pose."""
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """How one episode ended."""
-
-    object_name: str
-    seed: int
-    kept: bool
-    """The true interpretation is among the hypotheses and, where it fixes the pose, so is that."""
-    unique: bool
-    empty: bool
-    probes: int
-    contacts: int
-    seconds: float
-
-
-@cache
-def _environment(object_name: str) -> ProbeEnv:
-    """One an object and process: its tables take a second to build."""
-    return ProbeEnv(object_name=object_name)
-
-
-def play(object_name: str, seed: int) -> Outcome:
-    """Play one episode on a given object."""
-    env = _environment(object_name)
-    policy = make_policy("random")
-    rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(1)[0])
-    started = perf_counter()
-    observation, _ = env.reset(seed=seed)
-    ended = False
-    while not ended:
-        observation, _, terminated, truncated, _ = env.step(policy.act(observation, rng))
-        ended = terminated or truncated
-    belief = env.belief
-    return Outcome(
-        object_name=object_name,
-        seed=seed,
-        kept=belief is None or _holds_truth(env),
-        unique=belief is not None and belief.unique,
-        empty=belief is not None and belief.empty,
-        probes=len(env.touches),
-        contacts=len(env.contacts),
-        seconds=perf_counter() - started,
-    )
-
-
-def _true_faces(env: ProbeEnv) -> NDArray[np.int64]:
-    """(n,) the face that each contact so far was really on."""
-    faces = []
-    for touch in env.touches:
-        meeting = touch.starts_world.mean(axis=0) * (1.0, 1.0, 0.0)
-        directions = meeting - touch.starts_world
-        directions /= np.linalg.norm(directions, axis=1, keepdims=True)
-        hits = cast_rays(env.true_object, env.T_world_object, touch.starts_world, directions)
-        faces.append(hits.faces[touch.outcomes == OBJECT])
-    return np.concatenate(faces)
-
-
-def _holds_truth(env: ProbeEnv) -> bool:
-    """Whether some hypothesis has the true interpretation and, if it fixes the pose, that too."""
-    model, true_faces = env.true_object, _true_faces(env)
-    for hypothesis in env.belief.hypotheses if env.belief else ():
-        if hypothesis.object_name != model.name:
-            continue
-        if (hypothesis.interpretations == true_faces).all(axis=1).any():
-            error = pose_difference(model, hypothesis.pose, env.T_world_object)
-            near = (
-                error.rotation < NEAR_ROTATION
-                and error.translation < NEAR_TRANSLATION * model.diameter
-            )
-            return near or not hypothesis.determined
-    return False
-
-
-def main() -> None:
-    """Play, with a progress bar, and print a table; exit 1 if the truth was lost."""
+if TYPE_CHECKING:
     from rich.console import Console
-    from rich.progress import track
     from rich.table import Table
 
-    episodes = int(sys.argv[1]) if len(sys.argv) > 1 else 100
-    with ProcessPoolExecutor(os.cpu_count()) as workers:
-        jobs = [
-            workers.submit(play, name, seed) for seed in range(episodes) for name in STAND_IN_NAMES
-        ]
-        outcomes = [
-            job.result()
-            for job in track(as_completed(jobs), total=len(jobs), description="episodes")
-        ]
-    table = Table(
-        "object", "truth kept", "empty", "wrong", "unique", "probes", "contacts", "s", box=None
-    )
-    for column in table.columns[1:]:
-        column.justify = "right"
-    for name in STAND_IN_NAMES:
-        own = [outcome for outcome in outcomes if outcome.object_name == name]
-        table.add_row(
-            name,
-            f"{sum(o.kept for o in own)}/{len(own)}",
-            str(sum(o.empty for o in own)),
-            str(sum(o.unique and not o.kept for o in own)),
-            f"{np.mean([o.unique for o in own]):.0%}",
-            f"{np.mean([o.probes for o in own]):.1f}",
-            f"{np.mean([o.contacts for o in own]):.1f}",
-            f"{np.mean([o.seconds for o in own]):.1f}",
-        )
-    console = Console()
+    from .soundness_check import Outcome
+
+T = TypeVar("T")
+
+COMMAND = "python -m palpate.scripts.soundness"
+MOST_SHOWN = 4
+"""Broken bounds that are told of one case."""
+
+
+def run_case(kind: str, seed: int, index: int) -> Outcome:
+    """Draw and judge a case; one that raises counts as lost, and says so."""
+    from .soundness_cases import draw_case
+    from .soundness_check import judge, raised
+
+    case = draw_case(kind, seed, index)
+    try:
+        return judge(case)
+    except Exception as error:
+        return raised(case, error)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the campaign and print its tables; 1 if a truth was lost or a pose broke a bound."""
+    keep_to_one_thread()
+    # Only now: what these import reads the number of threads once.
+    from rich.console import Console
+
+    from .soundness_cases import KINDS
+
+    options = _parser({name: kind.what for name, kind in KINDS.items()}).parse_args(arguments)
+    console = Console(highlight=False, soft_wrap=True)
+    if options.only:
+        return _only(console, options.only, options.seed)
+    failed = False
+    if options.cases:
+        failed |= _cases(console, options, tuple(options.kinds or KINDS))
+    if options.episodes:
+        failed |= _episodes(console, options)
+    return int(failed)
+
+
+def _cases(console: Console, options: argparse.Namespace, kinds: tuple[str, ...]) -> bool:
+    from .soundness_cases import draw_kind
+
+    jobs = [
+        (draw_kind(options.seed, index, kinds), options.seed, index)
+        for index in range(options.cases)
+    ]
+    with console.status("compiling kernels, if any are new"):
+        for kind in kinds:
+            run_case(kind, 0, 0)
+    outcomes = list(_spread(run_case, jobs, "cases", console, options.workers))
+    outcomes.sort(key=lambda outcome: int(outcome.name.partition(":")[2]))
     console.print(
-        "Episodes with random probes, at 0.01 in and pi/10, at most 40 probes.\n"
+        f"\n{len(outcomes)} random cases, seed {options.seed}. lost: the true interpretation is in"
+        " no hypothesis.\ncut short: a limit ended the search, so that the truth may be missing"
+        " (held: it is not).\nundecided: hypotheses not called proven; bad: cases in which a proven"
+        " pose breaks a bound.\n"
+    )
+    console.print(_table("kind", outcomes, lambda outcome: outcome.kind))
+    console.print(_table("object", outcomes, lambda outcome: outcome.object_name))
+    failures = [outcome for outcome in outcomes if outcome.lost or outcome.bad]
+    for outcome in failures:
+        _tell(console, outcome, options.seed)
+    return bool(failures)
+
+
+def _episodes(console: Console, options: argparse.Namespace) -> bool:
+    from ..assets import STAND_IN_NAMES
+    from .soundness_episodes import episode_table, play
+
+    jobs = [(name, seed) for name in STAND_IN_NAMES for seed in range(options.episodes)]
+    outcomes = list(_spread(play, jobs, "episodes", console, options.workers))
+    outcomes.sort(key=lambda o: (STAND_IN_NAMES.index(o.object_name), o.seed))
+    console.print(
+        "\nEpisodes with random probes, at 0.01 in and pi/10, at most 40 probes.\n"
         "wrong: ended with one hypothesis, and not the truth; s: mean seconds an episode.\n"
     )
-    console.print(table)
+    console.print(episode_table(outcomes))
     lost = [outcome for outcome in outcomes if not outcome.kept]
-    for outcome in sorted(lost, key=lambda o: (o.object_name, o.seed)):
-        console.print(f"lost: --object {outcome.object_name} --seed {outcome.seed}")
-    sys.exit(1 if lost else 0)
+    for outcome in lost:
+        console.print(f"lost: palpate episode --object {outcome.object_name} --seed {outcome.seed}")
+    return bool(lost)
+
+
+def _only(console: Console, name: str, seed: int) -> int:
+    from .soundness_cases import KINDS, draw_case
+    from .soundness_check import judge
+
+    kind, _, index = name.partition(":")
+    if kind not in KINDS or not index.isdecimal():
+        console.print(f"{name!r} names no case: say KIND:INDEX, of the kinds {', '.join(KINDS)}")
+        return 2
+    outcome = judge(draw_case(kind, seed, int(index)))
+    _tell(console, outcome, seed)
+    return int(outcome.lost or bool(outcome.bad))
+
+
+def _tell(console: Console, outcome: Outcome, seed: int) -> None:
+    verdict = "held" if outcome.held else "LOST" if outcome.lost else "missing, but cut short"
+    if outcome.bad:
+        verdict += ", BAD WITNESS"
+    console.print(
+        f"{verdict}: {COMMAND} --seed {seed} --only {outcome.name}\n"
+        f"    {outcome.object_name}, {outcome.contacts} contacts, {outcome.hypotheses} hypotheses,"
+        f" {outcome.undecided} of them undecided, {outcome.milliseconds:.0f} ms"
+    )
+    for line in outcome.bad[:MOST_SHOWN]:
+        console.print(f"    {line}", markup=False)
+
+
+def _table(title: str, outcomes: Sequence[Outcome], key: Callable[[Outcome], str]) -> Table:
+    import numpy as np
+    from rich.table import Table
+
+    heads = ("cases", "lost", "cut short", "held", "hypotheses", "undecided", "bad", "ms", "99 %")
+    table = Table(title, *heads, box=None)
+    for column in table.columns[1:]:
+        column.justify = "right"
+    groups = sorted({key(outcome) for outcome in outcomes})
+    for group in (*groups, "all"):
+        own = [outcome for outcome in outcomes if group in ("all", key(outcome))]
+        short = [outcome for outcome in own if not outcome.complete]
+        median, tail = np.percentile([outcome.milliseconds for outcome in own], (50, 99))
+        table.add_row(
+            group,
+            str(len(own)),
+            str(sum(outcome.lost for outcome in own)),
+            str(len(short)),
+            str(sum(outcome.held for outcome in short)),
+            str(sum(outcome.hypotheses for outcome in own)),
+            str(sum(outcome.undecided for outcome in own)),
+            str(sum(bool(outcome.bad) for outcome in own)),
+            f"{median:.1f}",
+            f"{tail:.0f}",
+        )
+    return table
+
+
+def _spread(
+    call: Callable[..., T],
+    jobs: Sequence[tuple[Any, ...]],
+    what: str,
+    console: Console,
+    workers: int,
+) -> Iterator[T]:
+    """What the jobs return, in the order they end, under a progress bar that says how long yet."""
+    from rich.progress import track
+
+    bar = {"total": len(jobs), "description": what, "console": console}
+    if workers == 1:
+        yield from track((call(*job) for job in jobs), **bar)
+        return
+    with ProcessPoolExecutor(workers) as pool:
+        running = [pool.submit(call, *job) for job in jobs]
+        for job in track(as_completed(running), **bar):
+            yield job.result()
+
+
+def _parser(kinds: dict[str, str]) -> argparse.ArgumentParser:
+    listed = "\n".join(f"  {name:<14}{what}" for name, what in kinds.items())
+    parser = argparse.ArgumentParser(
+        prog=COMMAND,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        description="Touch known objects at known poses, with noise inside its bounds and on them,"
+        "\nand look for a truth that is lost or for a proven pose that breaks a bound."
+        "\nExits with 1 if there is one.",
+        epilog=f"kinds of case:\n{listed}\n\n"
+        "A case is fixed by seed, kind and index, whatever else runs and on however many\n"
+        "workers. Each that fails is printed as the command that runs it alone, such as:\n"
+        f"  {COMMAND} --seed 0 --only free:17",
+    )
+    add = parser.add_argument
+    add("--cases", metavar="N", type=_count, default=20_000, help="random cases (20000)")
+    add("--episodes", metavar="N", type=_count, default=100, help="episodes an object (100)")
+    add("--seed", metavar="S", type=_count, default=0, help="seed of the cases (0)")
+    add(
+        "--workers",
+        metavar="N",
+        type=_one_or_more,
+        default=os.cpu_count() or 1,
+        help="processes (as many as there are processors)",
+    )
+    add("--kinds", metavar="KIND", nargs="+", choices=list(kinds), help="only these kinds (all)")
+    add("--only", metavar="KIND:INDEX", help="one case alone, told in full; no episodes")
+    return parser
+
+
+def _count(text: str) -> int:
+    value = int(text)
+    if value < 0:
+        raise argparse.ArgumentTypeError(f"{value} is below zero")
+    return value
+
+
+def _one_or_more(text: str) -> int:
+    value = int(text)
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"{value} is below one")
+    return value
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -166,3 +166,63 @@ def test_joined_parts_are_the_whole():
 def test_no_parts_join_to_no_contacts():
     assert len(Contacts.join([])) == 0
     assert Contacts.none().positions.shape == (0, 3)
+
+
+# Where the probe came from
+
+
+def test_approaches_are_unknown_unless_given_and_kept_by_rows_and_joins():
+    plain = contacts(2)
+    assert not plain.approach_known.any()
+    ways = [[0.0, 0.0, -1.0], [np.nan] * 3]
+    felt = Contacts(np.zeros((2, 3)), UP * 2, position_error=1, normal_error=0.2, approaches=ways)
+    np.testing.assert_array_equal(felt.approach_known, [True, False])
+    np.testing.assert_array_equal(felt.approaches, [[0, 0, -1], [0, 0, 0]])
+    np.testing.assert_array_equal(felt[[1, 0]].approach_known, [False, True])
+    both = Contacts.join([plain, felt])
+    np.testing.assert_array_equal(both.approach_known, [False, False, True, False])
+
+
+def test_approaches_rounded_as_text_are_made_unit():
+    felt = Contacts(
+        [[0, 0, 0]],
+        UP,
+        position_error=1,
+        normal_error=0.2,
+        approaches=[[0.5773, 0.5774, -0.5774]],
+    )
+    assert abs(np.linalg.norm(felt.approaches) - 1.0) < 1e-15
+
+
+@pytest.mark.parametrize(
+    ("ways", "message"),
+    [
+        ([0, 0, 1], r"approaches must have shape \(n, 3\), or .*, not \(3,\)"),
+        ([[0, 0, 1]] * 2, r"approaches have shape \(2, 3\) but positions \(1, 3\): give one a pos"),
+        ([[0, 1]], r"approaches have shape \(1, 2\) but positions \(1, 3\)"),
+        ([[0, 0, 1.01]], r"approaches: row 0 has length 1.01; .* unit vectors"),
+        ([[0, 0, 1e-9]], r"approaches: row 0 has length 1e-09; .* unit vectors"),
+        ([[0, np.nan, 1]], r"approaches: row 0 .* finite"),
+        ([[0, np.inf, 0]], r"approaches: row 0 is \[0.0, inf, 0.0\]; it must be finite"),
+    ],
+)
+def test_what_cannot_be_an_approach_is_refused_with_a_reason(ways, message):
+    with pytest.raises(ValueError, match=message):
+        Contacts([[0, 0, 0]], UP, position_error=1, normal_error=0.2, approaches=ways)
+
+
+def test_an_unknown_normal_faces_the_approach_and_a_known_one_stays():
+    felt = Contacts(
+        np.zeros((4, 3)),
+        [UP[0], [np.nan] * 3, [np.nan] * 3, UP[0]],
+        position_error=1,
+        normal_error=[0.2, 1.0, 1.0, 3.0],
+        approaches=[[1, 0, 0], [0, 1, 0], [0, 0, 0], [0, 1, 0]],
+    )
+    facing = felt.facing_approach()
+    half_space = np.pi / 2.0 + 0.01
+    np.testing.assert_array_equal(facing.normals[[0, 1, 3]], [UP[0], [0, -1, 0], [0, -1, 0]])
+    np.testing.assert_allclose(facing.normal_error, [0.2, half_space, np.pi, half_space])
+    np.testing.assert_array_equal(facing.approaches, felt.approaches)
+    assert facing.facing_approach() is facing
+    assert contacts().facing_approach().normal_error.max() < 1.0

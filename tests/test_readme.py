@@ -31,8 +31,13 @@ def test_the_contacts_are_recognised_as_the_readme_says():
     assert np.allclose(found, said, atol=2e-3)
 
 
+def test_what_else_is_known_is_told_as_the_readme_says():
+    assert BLOCKS[3][0] == "python"
+    assert run(BLOCKS[1][1] + BLOCKS[3][1]) == BLOCKS[2][1] + BLOCKS[4][1]
+
+
 def test_the_environment_is_made_as_the_readme_says():
-    language, program = BLOCKS[3]
+    language, program = BLOCKS[5]
     assert language == "python"
     assert run(program) == ""
 
