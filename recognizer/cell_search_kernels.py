@@ -57,8 +57,7 @@ def _passes(
     model,
     half_angles,
     packed,
-    first_domain,
-    later_domain,
+    domains,
     spare,
     switches,
     readings,
@@ -69,10 +68,10 @@ def _passes(
 ):
     """Whether some interpretation passes all pairs in a cell, or none was excluded in time."""
     left, sizes, untried, faces, nulls, near = space
-    n, words = len(contacts[0]), len(later_domain)
+    n, words = domains.shape
     lost = 0
     for j in range(n):
-        left[0, j] = first_domain if j == 0 else later_domain
+        left[0, j] = domains[j]
         sizes[0, j] = facing(
             facings[j], contacts[3][j], contacts[4][j], angle, model, left[0, j], near
         )
@@ -153,8 +152,7 @@ def passing_cells(
     model,
     half_angles,
     packed,
-    first_domain,
-    later_domain,
+    domains,
     spare,
     switches,
     readings,
@@ -164,7 +162,8 @@ def passing_cells(
     """Cells of rotations that together hold those of all poses within the bounds.
 
     Args:
-        contacts: see `search_kernels.search_model`, as are those that follow.
+        contacts: see `search_kernels.search_model`, as are those that follow but ...
+        domains: (n, w) bit sets, the features that each contact may be on.
         readings: (n, n, 9) see `mask_kernels.pair_readings`.
         finest: an angle, radians; cells of less are not cut further.
         most: cells to look at; then what is left is not cut further.
@@ -172,7 +171,7 @@ def passing_cells(
     Returns:
         (c, 3, 3) rotations, object to world, and (c,) angles: each rotation of a cell is within it.
     """
-    n, features, words = len(contacts[0]), packed.shape[2], len(later_domain)
+    (n, words), features = domains.shape, packed.shape[2]
     space = (
         np.zeros((n + 1, n, words), np.uint64),
         np.full((n + 1, n), features),
@@ -214,8 +213,7 @@ def passing_cells(
                         model,
                         half_angles,
                         packed,
-                        first_domain,
-                        later_domain,
+                        domains,
                         spare,
                         switches,
                         readings,

@@ -129,14 +129,23 @@ def search_model(
     in_cell = finest > 0.0
     cells, cell_angles = np.empty((1, 3, 3)), np.zeros(1)
     if in_cell:
+        left[0, :] = later_domain
+        if start == 0:
+            left[0, 0] = first_domain
+        # What is known of the first contacts says where to look.
+        left[0, :start] = _NONE
+        for m in range(len(prefixes)):
+            for i in range(start):
+                f = prefixes[m, i]
+                if f >= 0:
+                    left[0, i, f >> 6] |= _ONE << np.uint64(f & 63)
         cells, cell_angles = passing_cells(
             contacts,
             errors,
             model,
             half_angles,
             packed,
-            first_domain,
-            later_domain,
+            left[0].copy(),
             spare,
             switches,
             readings,
