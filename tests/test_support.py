@@ -53,17 +53,6 @@ def test_a_solid_stands_on_those_faces_where_every_small_tilt_raises_its_centroi
 
 
 @pytest.mark.parametrize("name", [*SMALL, *OTHERS])
-def test_trimesh_lays_a_solid_on_the_same_faces(name: str) -> None:
-    model = solid(name)
-    mesh = trimesh.Trimesh(model.vertices, model.triangles, process=False)
-    transforms, chances = trimesh.poses.compute_stable_poses(mesh, center_mass=model.centroid)
-    down = np.array([T[:3, :3].T @ [0.0, 0.0, -1.0] for T in transforms[chances > 1e-4]])
-    normals = np.array([face.normal for face in stable_faces(model)])
-    # It gives the faces where solids come to rest: each of them is one that they can stand on.
-    assert (angle_between(down[:, None], normals).min(axis=1) < 1e-5).all()
-
-
-@pytest.mark.parametrize("name", [*SMALL, *OTHERS])
 def test_a_face_to_stand_on_has_its_plane_outline_and_width(name: str) -> None:
     model = solid(name)
     for face in stable_faces(model):
