@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 import oracles
 import pytest
-import trimesh
 from checker import angle_between, standing_corners
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
