@@ -258,8 +258,14 @@ def _search_standing(
 
 
 def _vague(contacts: Contacts) -> bool:
-    """Whether so few normals are known that they leave the rotation open whatever they are."""
-    return int(np.count_nonzero(contacts.normal_error < np.pi / 2.0)) < 2
+    """Whether the known normals leave the rotation open: fewer than two, or maybe all parallel."""
+    known = contacts.normal_error < np.pi / 2.0
+    normals, errors = contacts.normals[known], contacts.normal_error[known]
+    if len(normals) < 2:
+        return True
+    leaning = np.arccos(np.minimum(np.abs(normals @ normals[0]), 1.0))
+    # If none surely leans away from the first, two others are about as parallel.
+    return bool((leaning <= errors[0] + errors).all())
 
 
 def _finest(contacts: Contacts, radius: float) -> float:
