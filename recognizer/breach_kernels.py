@@ -105,8 +105,10 @@ def move_inside(place, clearance, model, solid_faces, nearest, near, trial):
         Its clearance after the move: zero at most; above zero if it didn't get inside.
     """
     distance = signed_distance(place, model, solid_faces, nearest, near)
-    if clearance <= 0.0 or distance < 0.0:
+    if distance < 0.0:
         return min(clearance, 0.0)
+    if clearance <= 0.0:
+        return 1.0
     least, best = np.inf, 0.0
     far = distance + 1e-300
     for part in range(1, 6):

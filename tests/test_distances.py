@@ -9,9 +9,10 @@ from checker import signed_distances
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
-from sensing import SMALL
+from sensing import CUBE, SMALL
 
 from palpate.recognizer import Polyhedron
+from palpate.recognizer.breach_kernels import move_inside
 from palpate.recognizer.distance_kernels import deepest, signed_distance
 from palpate.recognizer.features import all_features, face_features
 from palpate.recognizer.pose import ModelTest
@@ -189,3 +190,19 @@ def test_a_path_through_a_hole_meets_its_walls_at_their_distance() -> None:
     found, place = walk(holed, beside, other + [0.025, 0.0, 0.0], -1e-3, 1e-5)
     assert found == pytest.approx(-0.005, abs=1e-4)
     assert 0.0 < place[2] < 0.025
+
+
+def test_a_place_outside_is_not_taken_for_one_inside_that_has_to_leave() -> None:
+    model = ModelTest(CUBE).model
+    top = CUBE.vertices[:, 2].max()
+    for height, clearance, after in (
+        (1e-5, -1e-6, 1.0),
+        (-1e-5, -1e-6, -1e-6),
+        (1e-5, 1e-3, 0.0),
+        (2e-3, 1e-3, 1.0),
+    ):
+        place = CUBE.centroid.copy()
+        place[2] = top + height
+        spaces = np.empty(3), np.empty(3), np.empty(3)
+        assert move_inside(place, clearance, model, CUBE.face_count, *spaces) == after
+        assert (place[2] < top) == (after <= 0.0)
