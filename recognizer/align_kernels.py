@@ -10,29 +10,31 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from .compiling import borrowing
 from .reading_kernels import UNKNOWN_NORMAL
 
 ROUNDING = 1e-6
 """Misfit of normals, in squared bounds, that is put down to rounding."""
 
 
-@njit(cache=True)
-def _eigenvectors(matrix, vectors):
-    """Jacobi's method on a symmetric (4, 4) matrix, which ends diagonal, into columns."""
-    for a in range(4):
-        for b in range(4):
+@borrowing
+def diagonalise(matrix, vectors):
+    """Eigenvectors of a symmetric (k, k) matrix, which ends diagonal, as columns (Jacobi)."""
+    count = len(matrix)
+    for a in range(count):
+        for b in range(count):
             vectors[a, b] = 1.0 if a == b else 0.0
     for _ in range(30):
         off = 0.0
         size = 0.0
-        for a in range(4):
+        for a in range(count):
             size += abs(matrix[a, a])
             for b in range(a):
                 off += abs(matrix[a, b])
         if off <= 1e-14 * (size + off):
             return
-        for p in range(3):
-            for q in range(p + 1, 4):
+        for p in range(count - 1):
+            for q in range(p + 1, count):
                 if matrix[p, q] == 0.0:
                     continue
                 theta = 0.5 * (matrix[q, q] - matrix[p, p]) / matrix[p, q]
@@ -41,13 +43,13 @@ def _eigenvectors(matrix, vectors):
                     t = -t
                 c = 1.0 / np.sqrt(t * t + 1.0)
                 s = t * c
-                for k in range(4):
+                for k in range(count):
                     left, right = matrix[k, p], matrix[k, q]
                     matrix[k, p], matrix[k, q] = c * left - s * right, s * left + c * right
-                for k in range(4):
+                for k in range(count):
                     left, right = matrix[p, k], matrix[q, k]
                     matrix[p, k], matrix[q, k] = c * left - s * right, s * left + c * right
-                for k in range(4):
+                for k in range(count):
                     left, right = vectors[k, p], vectors[k, q]
                     vectors[k, p], vectors[k, q] = c * left - s * right, s * left + c * right
 
@@ -100,7 +102,7 @@ def align(count, faces, model, half_angles, contacts, rotation):
     k4[0, 1] = k4[1, 0] = b[2, 1] - b[1, 2]
     k4[0, 2] = k4[2, 0] = b[0, 2] - b[2, 0]
     k4[0, 3] = k4[3, 0] = b[1, 0] - b[0, 1]
-    _eigenvectors(k4, vectors)
+    diagonalise(k4, vectors)
     best = 0
     for k in range(1, 4):
         if k4[k, k] > k4[best, best]:
@@ -130,7 +132,7 @@ def align(count, faces, model, half_angles, contacts, rotation):
     return min(np.pi, 2.0 * np.arcsin(np.sqrt(slack / gap)) + 1e-6)
 
 
-@njit(cache=True)
+@borrowing
 def middle_translation(count, faces, points, middles, rotation, translation):
     """The shift that puts the middles of the faces onto the contacts, on average."""
     translation[:] = 0.0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from .compiling import borrowing
 from .distance_kernels import deepest, signed_distance
 from .reading_kernels import cone_support
 
@@ -12,7 +13,7 @@ EXACT = 1e-9
 """By how much a pose may break a limit, in sines or shares of the radius: rounding."""
 
 
-@njit(cache=True)
+@borrowing
 def below_support(pose, corners, signs, limits, up, radius):
     """The corner that breaks its limit most; -1 if none does."""
     rotation, translation = pose
@@ -30,7 +31,7 @@ def below_support(pose, corners, signs, limits, up, radius):
     return which
 
 
-@njit(cache=True)
+@borrowing
 def seen_from_behind(count, faces, pose, approaches, leasts, model, near):
     """A contact whose feature has no normal that faces its approach; -1 if there is none."""
     rotation = pose[0]
@@ -48,7 +49,7 @@ def seen_from_behind(count, faces, pose, approaches, leasts, model, near):
     return -1
 
 
-@njit(cache=True)
+@borrowing
 def pierced_paths(paths, pose, bound, model, solid_faces, broken, worst_places, space):
     """The paths that run deeper in the object than is allowed, and where.
 
@@ -97,7 +98,7 @@ def pierced_paths(paths, pose, bound, model, solid_faces, broken, worst_places, 
     return count
 
 
-@njit(cache=True)
+@borrowing
 def move_inside(place, clearance, model, solid_faces, nearest, near, trial):
     """Move a place of a path, within the radius around it that is free, into the object.
 

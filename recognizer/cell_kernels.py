@@ -9,8 +9,8 @@ had been measured.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from .compiling import borrowing
 from .mask_kernels import bit_index
 from .reading_kernels import ARC, NO_CONE, UNKNOWN_NORMAL, nearest_in_cone
 
@@ -18,7 +18,7 @@ _ONE = np.uint64(1)
 _NONE = np.uint64(0)
 
 
-@njit(cache=True)
+@borrowing
 def facing(normal, chord, sine, angle, model, domain, near):
     """Drop features that no rotation of a cell turns towards a contact's normal.
 
@@ -57,7 +57,7 @@ def facing(normal, chord, sine, angle, model, domain, near):
     return count
 
 
-@njit(cache=True)
+@borrowing
 def narrow_in_cell(a, packed, half_angles, normals, between, reach, angle, domain):
     """Drop features of contact j that don't fit contact i on ``a`` in any rotation of a cell.
 

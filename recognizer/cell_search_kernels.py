@@ -11,6 +11,7 @@ import numpy as np
 from numba import njit
 
 from .cell_kernels import facing, narrow_in_cell
+from .compiling import borrowing
 from .mask_kernels import bit_index, narrow
 
 _ONE = np.uint64(1)
@@ -35,7 +36,7 @@ def rotation_of(vector, rotation):
     rotation[1, 2], rotation[2, 1] = second * y * z - first * x, second * y * z + first * x
 
 
-@njit(cache=True)
+@borrowing
 def view_cell(rotation, points, normals, between, facings):
     """Vectors between contacts (n, n, 3), i < j, and normals (n, 3) in a cell's own frame."""
     for j in range(len(points)):

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from .compiling import borrowing
 from .polygon_kernels import nearest_in_polygon
 
 STRIDE = 64
 """Inside the object a path is looked at once in so small a share of its length at least."""
 
 
-@njit(cache=True)
+@borrowing
 def _solid_angle(x, corners, start, stop):
     """Half the solid angle of a convex polygon seen from a point (Van Oosterom and Strackee)."""
     a0, a1, a2 = corners[start, 0] - x[0], corners[start, 1] - x[1], corners[start, 2] - x[2]
@@ -35,7 +35,7 @@ def _solid_angle(x, corners, start, stop):
     return total
 
 
-@njit(cache=True)
+@borrowing
 def signed_distance(x, model, faces, nearest, near):
     """How far a point is from a solid's surface, negative inside.
 
@@ -62,7 +62,7 @@ def signed_distance(x, model, faces, nearest, near):
     return -np.sqrt(squared) if seen > np.pi else np.sqrt(squared)
 
 
-@njit(cache=True)
+@borrowing
 def deepest(one, other, clearance, grain, bound, model, faces, place, point, nearest, near):
     """Where a path comes nearest to a solid, or runs deepest in it.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from .compiling import borrowing
 from .feasibility_kernels import seek_feasible
 from .motion_kernels import move
 from .proof_kernels import workspace
@@ -12,7 +13,7 @@ from .reading_kernels import carry, read, worst_on_pieces
 from .verdict_kernels import EXACT
 
 
-@njit(cache=True)
+@borrowing
 def _meets(count, faces, contacts, model, rotation, translation, x, u, readings):
     carry(count, contacts[0], contacts[1], rotation, translation, x, u)
     worst = read(count, faces, faces, x, u, model, contacts, readings)
@@ -20,7 +21,7 @@ def _meets(count, faces, contacts, model, rotation, translation, x, u, readings)
     return max(worst, exact) <= 1.0 + EXACT
 
 
-@njit(cache=True)
+@borrowing
 def _moved(rotation, translation, new_rotation, new_translation, model):
     """How far a motion took the object: shift of its centroid and turn times its radius, metres."""
     centre, radius = model[5], model[6]

@@ -11,9 +11,9 @@ descent on the violated ones would.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from .motion_kernels import cross, move, slope_row, solve
+from .compiling import borrowing
+from .motion_kernels import copy_pose, cross, move, slope_row, solve
 from .polygon_kernels import CORNER, INSIDE
 from .proof_kernels import disprove
 from .reading_kernels import ARC, NO_CONE, carry, read
@@ -24,15 +24,17 @@ EXACT = 1e-9
 """What the largest ``g`` of a witness may be: rounding."""
 
 
-@njit(cache=True)
+@borrowing
 def _outer(row, weight, system):
     for a in range(6):
         for b in range(a + 1):
             system[a, b] += weight * row[a] * row[b]
 
 
-@njit(cache=True)
-def _assemble_barrier(level, count, faces, x, u, model, contacts, readings, system, gradient):
+@borrowing
+def _assemble_barrier(
+    level, count, faces, x, u, model, contacts, readings, system, gradient, space
+):
     """Value and derivatives of ``-sum log(level - g)`` at one pose and level.
 
     Args:
@@ -46,6 +48,7 @@ def _assemble_barrier(level, count, faces, x, u, model, contacts, readings, syst
         readings: see `reading_kernels.read`.
         system: (7, 7) lower triangle of the Hessian in motion and level, written in place.
         gradient: (7,) written in place.
+        space: vectors of `proof_kernels.barrier_workspace`.
 
     Returns:
         The value, infinity if some ``g`` is not below the level.
@@ -53,12 +56,7 @@ def _assemble_barrier(level, count, faces, x, u, model, contacts, readings, syst
     normals, centre, radius = model[0], model[5], model[6]
     _, _, reaches, chords, sines = contacts
     gaps, lengths, heights, regions, kinds, misses, directions = readings
-    up = np.empty(6)
-    out = np.empty(6)
-    slope = np.empty(6)
-    turn = np.empty(3)
-    arm = np.empty(3)
-    direction = np.empty(3)
+    up, out, slope, turn, arm, direction = space
     system[:] = 0.0
     gradient[:] = 0.0
     value = 0.0
@@ -91,7 +89,8 @@ def _assemble_barrier(level, count, faces, x, u, model, contacts, readings, syst
                 slope[a] += 2.0 * inverse * outside * out[a]
             if regions[i] == CORNER:
                 cross(m, direction, turn)
-                direction[:] = turn
+                for k in range(3):
+                    direction[k] = turn[k]
                 slope_row(direction, arm, radius, turn, out)
                 _outer(out, bend, system)
         _outer(slope, hold * hold, system)
@@ -129,7 +128,7 @@ def _assemble_barrier(level, count, faces, x, u, model, contacts, readings, syst
     return value
 
 
-@njit(cache=True)
+@borrowing
 def _add_ball(level, turn, angle, radius, system, gradient):
     """The same for a rotation that is to stay in a ball; returns the value."""
     squared = 0.0
@@ -153,7 +152,7 @@ def _add_ball(level, turn, angle, radius, system, gradient):
     return -np.log(room)
 
 
-@njit(cache=True)
+@borrowing
 def seek_feasible(
     count, faces, targets, contacts, model, most, prove, ball, angle, rotation, translation, work
 ):
@@ -182,14 +181,9 @@ def seek_feasible(
     centre, radius = model[5], model[6]
     readings, rows = work[0], work[3]
     x, u, weights = rows[0], rows[1], rows[3]
-    system = np.empty((7, 7))
-    gradient = np.empty(7)
-    factor = np.zeros((7, 7))
-    step = np.empty(7)
-    part = np.empty(7)
-    turn = np.empty(3)
-    trial_rotation = np.empty((3, 3))
-    trial_translation = np.empty(3)
+    (system, factor), (gradient, step, part), space, trial_pose = work[8]
+    trial_rotation, trial_translation = trial_pose
+    turn = space[3]
     carry(count, points, measured, rotation, translation, x, u)
     worst = read(count, faces, targets, x, u, model, contacts, readings) ** 2 - 1.0
     if worst <= EXACT:
@@ -198,7 +192,7 @@ def seek_feasible(
     level = worst + 0.5 * (1.0 + worst)
     sharpness = amount / (1.0 + worst)
     value = _assemble_barrier(
-        level, count, faces, x, u, model, contacts, readings, system, gradient
+        level, count, faces, x, u, model, contacts, readings, system, gradient, space
     )
     if prove:
         # The start may be a little outside.
@@ -248,7 +242,8 @@ def seek_feasible(
             carry(count, points, measured, trial_rotation, trial_translation, x, u)
             worst = read(count, faces, targets, x, u, model, contacts, readings) ** 2 - 1.0
             trial = _assemble_barrier(
-                level + part[6], count, faces, x, u, model, contacts, readings, system, gradient
+                *(level + part[6], count, faces, x, u, model, contacts, readings, system, gradient),
+                space,
             )
             if prove and trial < np.inf:
                 turn_between(ball, trial_rotation, turn)
@@ -261,8 +256,7 @@ def seek_feasible(
             return UNDECIDED
         level += part[6]
         value = trial
-        rotation[:] = trial_rotation
-        translation[:] = trial_translation
+        copy_pose(trial_rotation, trial_translation, rotation, translation)
         if level <= EXACT or worst <= EXACT:
             return FEASIBLE
     return UNDECIDED

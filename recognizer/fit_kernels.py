@@ -5,13 +5,16 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from .compiling import borrowing
 from .motion_kernels import add_row, move, slope_row, solve
 from .polygon_kernels import CORNER, INSIDE
 from .reading_kernels import ARC, NO_CONE, carry, read
 
 
-@njit(cache=True)
-def assemble_fit(bounded, count, faces, x, u, model, contacts, readings, system, gradient):
+@borrowing
+def assemble_fit(
+    bounded, count, faces, x, u, model, contacts, readings, system, gradient, space
+):
     """Normal equations of the least-squares misfit at one pose; returns the misfit.
 
     Each contact counts its height above the plane of its face, how far beyond its bound it lies
@@ -30,14 +33,12 @@ def assemble_fit(bounded, count, faces, x, u, model, contacts, readings, system,
         readings: see `reading_kernels.read`, which must have run.
         system: (6, 6) lower triangle written in place.
         gradient: (6,) written in place.
+        space: vectors of `proof_kernels.barrier_workspace`.
     """
     normals, start, centre, radius = model[0], model[3], model[5], model[6]
     _, _, reaches, chords, sines = contacts
     gaps, lengths, heights, regions, kinds, misses, directions = readings
-    row = np.empty(6)
-    arm = np.empty(3)
-    turn = np.empty(3)
-    direction = np.empty(3)
+    row, _, _, turn, arm, direction = space
     system[:] = 0.0
     gradient[:] = 0.0
     cost = 0.0
@@ -97,7 +98,7 @@ def assemble_fit(bounded, count, faces, x, u, model, contacts, readings, system,
 
 
 @njit(cache=True)
-def fit_pose(count, faces, contacts, model, most, rotation, translation, readings):
+def fit_pose(count, faces, contacts, model, most, rotation, translation, work):
     """Damped Gauss-Newton from a starting pose, in place; returns the misfit.
 
     The damping holds the pose still along a freedom that no contact bears on, so that it does not
@@ -111,8 +112,9 @@ def fit_pose(count, faces, contacts, model, most, rotation, translation, reading
         most: the most steps.
         rotation: (3, 3) object to world.
         translation: (3,) object to world, metres.
-        readings: see `reading_kernels.read`; work space.
+        work: see `proof_kernels.workspace`.
     """
+    readings, space = work[0], work[8][2]
     points, normals, reaches = contacts[0], contacts[1], contacts[2]
     centre, radius = model[5], model[6]
     x = np.empty((count, 3))
@@ -128,7 +130,9 @@ def fit_pose(count, faces, contacts, model, most, rotation, translation, reading
     finest = 1e-3 * reaches.min()
     carry(count, points, normals, rotation, translation, x, u)
     read(count, faces, faces, x, u, model, contacts, readings)
-    cost = assemble_fit(True, count, faces, x, u, model, contacts, readings, system, gradient)
+    cost = assemble_fit(
+        True, count, faces, x, u, model, contacts, readings, system, gradient, space
+    )
     # As if half a diameter were known of every freedom: nothing beside any real bound.
     least = 1.0 / (radius * radius)
     damping = least
@@ -148,7 +152,8 @@ def fit_pose(count, faces, contacts, model, most, rotation, translation, reading
         carry(count, points, normals, trial_rotation, trial_translation, x, u)
         read(count, faces, faces, x, u, model, contacts, readings)
         trial = assemble_fit(
-            True, count, faces, x, u, model, contacts, readings, trial_system, trial_gradient
+            *(True, count, faces, x, u, model, contacts, readings, trial_system, trial_gradient),
+            space,
         )
         if trial <= cost:
             gain = cost - trial

@@ -7,8 +7,8 @@ Python integer a uint64 would become signed and lose its highest bit.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from .compiling import borrowing
 from .tree_kernels import ANGLE, COMPONENT, DISTANCE, TILT
 
 COLUMNS = 11
@@ -23,18 +23,15 @@ _PLACES = np.array(
 ).argsort()
 
 
-@njit(cache=True)
+@borrowing
 def _angle_between(u, v):
     # Unlike the arc cosine of a dot product this is accurate at 0 and at pi.
-    apart = 0.0
-    together = 0.0
-    for k in range(3):
-        apart += (u[k] - v[k]) ** 2
-        together += (u[k] + v[k]) ** 2
+    apart = (u[0] - v[0]) ** 2 + (u[1] - v[1]) ** 2 + (u[2] - v[2]) ** 2
+    together = (u[0] + v[0]) ** 2 + (u[1] + v[1]) ** 2 + (u[2] + v[2]) ** 2
     return 2.0 * np.arctan2(np.sqrt(apart), np.sqrt(together))
 
 
-@njit(cache=True)
+@borrowing
 def _component_range(length, omega, error, reach):
     # The true normal lies in a cone around the measured one, so its component of the vector runs
     # from cos(omega + alpha) to cos(omega - alpha), clamped to [0, pi].
@@ -42,7 +39,7 @@ def _component_range(length, omega, error, reach):
     return least, length * np.cos(max(0.0, omega - error)) + reach
 
 
-@njit(cache=True)
+@borrowing
 def pair_readings(contacts, errors, readings):
     """What two contacts show of each other, for i < j.
 
@@ -57,16 +54,20 @@ def pair_readings(contacts, errors, readings):
     for j in range(len(points)):
         for i in range(j):
             row = readings[i, j]
-            d = points[j] - points[i]
-            length = np.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
+            first = (normals[i, 0], normals[i, 1], normals[i, 2])
+            second = (normals[j, 0], normals[j, 1], normals[j, 2])
+            d0 = points[j, 0] - points[i, 0]
+            d1 = points[j, 1] - points[i, 1]
+            d2 = points[j, 2] - points[i, 2]
+            length = np.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
             row[0] = length
-            row[1] = _angle_between(normals[i], normals[j])
+            row[1] = _angle_between(first, second)
             row[2] = np.pi / 2
             row[3] = np.pi / 2
             if length > 0.0:
-                d /= length
-                row[2] = _angle_between(normals[i], d)
-                row[3] = _angle_between(normals[j], -d)
+                d0, d1, d2 = d0 / length, d1 / length, d2 / length
+                row[2] = _angle_between(first, (d0, d1, d2))
+                row[3] = _angle_between(second, (-d0, -d1, -d2))
             # Each end of the vector is off by its own bound at most (memo's 2-delta).
             row[4] = reaches[i] + reaches[j]
             for side in range(2):
@@ -75,7 +76,7 @@ def pair_readings(contacts, errors, readings):
                 row[5 + 2 * side], row[6 + 2 * side] = low, high
 
 
-@njit(cache=True)
+@borrowing
 def narrow(a, packed, half_angle, reading, error_i, error_j, switches, domain, kept):
     """Which features of a set contact j can be on if contact i is on ``a``.
 
@@ -144,7 +145,7 @@ def narrow(a, packed, half_angle, reading, error_i, error_j, switches, domain, k
     return count
 
 
-@njit(cache=True)
+@borrowing
 def bit_index(single):
     """The place of the only bit set in a word."""
     return int(_PLACES[(single * _DE_BRUIJN) >> np.uint64(58)])

@@ -11,6 +11,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from .compiling import borrowing
+
 
 @njit(cache=True, inline="always")
 def cross(a, b, out):
@@ -20,7 +22,7 @@ def cross(a, b, out):
     out[2] = a[0] * b[1] - a[1] * b[0]
 
 
-@njit(cache=True)
+@borrowing
 def to_object(points, normals, rotation, translation, x, u):
     """Contacts and normals, (n, 3) each, from the world into the object's frame: ``x``, ``u``."""
     for i in range(len(points)):
@@ -32,7 +34,23 @@ def to_object(points, normals, rotation, translation, x, u):
                 u[i, k] += rotation[m, k] * normals[i, m]
 
 
-@njit(cache=True)
+@borrowing
+def copy_rotation(source, target):
+    """Write (3, 3) ``source`` into ``target``."""
+    for a in range(3):
+        for b in range(3):
+            target[a, b] = source[a, b]
+
+
+@borrowing
+def copy_pose(rotation, translation, to_rotation, to_translation):
+    """Write a pose, (3, 3) and (3,), into another."""
+    copy_rotation(rotation, to_rotation)
+    for a in range(3):
+        to_translation[a] = translation[a]
+
+
+@borrowing
 def slope_row(direction, arm, radius, turn, row):
     """Change of a length along ``direction`` at the end of ``arm`` with the small motions.
 
@@ -44,7 +62,7 @@ def slope_row(direction, arm, radius, turn, row):
         row[3 + k] = -direction[k]
 
 
-@njit(cache=True)
+@borrowing
 def add_row(row, residual, weight, system, gradient):
     """Add a weighted residual with (6,) derivative ``row`` to normal equations."""
     for a in range(6):
@@ -53,7 +71,7 @@ def add_row(row, residual, weight, system, gradient):
             system[a, b] += weight * row[a] * row[b]
 
 
-@njit(cache=True)
+@borrowing
 def solve(system, gradient, damping, factor, step):
     """Solve ``(system + damping) step = -gradient`` by Cholesky, in place.
 
@@ -89,7 +107,7 @@ def solve(system, gradient, damping, factor, step):
         step[a] = value / factor[a, a]
 
 
-@njit(cache=True)
+@borrowing
 def move(rotation, translation, step, centre, radius, new_rotation, new_translation):
     """Apply a small motion in the object's frame: rotate about its centroid, then shift."""
     wx, wy, wz = step[0] / radius, step[1] / radius, step[2] / radius
@@ -97,25 +115,22 @@ def move(rotation, translation, step, centre, radius, new_rotation, new_translat
     half = 0.5 * angle
     scale = np.sin(half) / angle if angle > 1e-12 else 0.5
     a, b, c, d = np.cos(half), scale * wx, scale * wy, scale * wz
-    turn = np.empty((3, 3))
-    turn[0, 0] = a * a + b * b - c * c - d * d
-    turn[0, 1] = 2.0 * (b * c - a * d)
-    turn[0, 2] = 2.0 * (b * d + a * c)
-    turn[1, 0] = 2.0 * (b * c + a * d)
-    turn[1, 1] = a * a - b * b + c * c - d * d
-    turn[1, 2] = 2.0 * (c * d - a * b)
-    turn[2, 0] = 2.0 * (b * d - a * c)
-    turn[2, 1] = 2.0 * (c * d + a * b)
-    turn[2, 2] = a * a - b * b - c * c + d * d
+    t00 = a * a + b * b - c * c - d * d
+    t01 = 2.0 * (b * c - a * d)
+    t02 = 2.0 * (b * d + a * c)
+    t10 = 2.0 * (b * c + a * d)
+    t11 = a * a - b * b + c * c - d * d
+    t12 = 2.0 * (c * d - a * b)
+    t20 = 2.0 * (b * d - a * c)
+    t21 = 2.0 * (c * d + a * b)
+    t22 = a * a - b * b - c * c + d * d
+    c0, c1, c2 = centre[0], centre[1], centre[2]
+    s0 = c0 + step[3] - (t00 * c0 + t01 * c1 + t02 * c2)
+    s1 = c1 + step[4] - (t10 * c0 + t11 * c1 + t12 * c2)
+    s2 = c2 + step[5] - (t20 * c0 + t21 * c1 + t22 * c2)
     for i in range(3):
-        for j in range(3):
-            new_rotation[i, j] = 0.0
-            for k in range(3):
-                new_rotation[i, j] += rotation[i, k] * turn[k, j]
-    for i in range(3):
-        new_translation[i] = translation[i]
-        for k in range(3):
-            shift = centre[k] + step[3 + k]
-            for m in range(3):
-                shift -= turn[k, m] * centre[m]
-            new_translation[i] += rotation[i, k] * shift
+        r0, r1, r2 = rotation[i, 0], rotation[i, 1], rotation[i, 2]
+        new_rotation[i, 0] = r0 * t00 + r1 * t10 + r2 * t20
+        new_rotation[i, 1] = r0 * t01 + r1 * t11 + r2 * t21
+        new_rotation[i, 2] = r0 * t02 + r1 * t12 + r2 * t22
+        new_translation[i] = translation[i] + r0 * s0 + r1 * s1 + r2 * s2

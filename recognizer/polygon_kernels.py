@@ -3,15 +3,24 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from .compiling import borrowing
 
 INSIDE, EDGE, CORNER = 1, 2, 3
 """What of a polygon is nearest; also in how many directions moving away costs distance."""
 
 
-@njit(cache=True)
+@borrowing
 def nearest_in_polygon(x, normal, offset, corners, start, stop, nearest):
-    """The nearest point of a solid convex polygon, or of a segment, into ``nearest``.
+    """`foot_in_polygon`, with the nearest point written into (3,) ``nearest``."""
+    squared, height, region, foot = foot_in_polygon(x, normal, offset, corners, start, stop)
+    nearest[0], nearest[1], nearest[2] = foot
+    return squared, height, region
+
+
+@borrowing
+def foot_in_polygon(x, normal, offset, corners, start, stop):
+    """The nearest point of a solid convex polygon, or of a segment.
 
     Args:
         x: (3,) the point.
@@ -20,10 +29,9 @@ def nearest_in_polygon(x, normal, offset, corners, start, stop, nearest):
         corners: (c, 3) corners, of which start to stop are the polygon's, counter-clockwise.
         start: the first corner.
         stop: one past the last corner.
-        nearest: (3,) written in place.
 
     Returns:
-        The squared distance, the signed height above the plane, and what is nearest.
+        The squared distance, the signed height above the plane, what is nearest, and where.
     """
     height = normal[0] * x[0] + normal[1] * x[1] + normal[2] * x[2] - offset
     y0 = x[0] - height * normal[0]
@@ -31,7 +39,7 @@ def nearest_in_polygon(x, normal, offset, corners, start, stop, nearest):
     y2 = x[2] - height * normal[2]
     best = np.inf
     region = INSIDE
-    nearest[0], nearest[1], nearest[2] = y0, y1, y2
+    n0, n1, n2 = y0, y1, y2
     # Two corners are a segment: a point on its line isn't inside of anything.
     segment = stop - start == 2
     last = stop - 1
@@ -59,10 +67,8 @@ def nearest_in_polygon(x, normal, offset, corners, start, stop, nearest):
             if gap < best:
                 best = gap
                 region = touched
-                nearest[0] = y0 - g0
-                nearest[1] = y1 - g1
-                nearest[2] = y2 - g2
+                n0, n1, n2 = y0 - g0, y1 - g1, y2 - g2
         last = k
     if region == INSIDE:
         best = 0.0
-    return height * height + best, height, region
+    return height * height + best, height, region, (n0, n1, n2)

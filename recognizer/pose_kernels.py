@@ -6,6 +6,7 @@ import numpy as np
 from numba import njit
 
 from .align_kernels import align, middle_translation
+from .compiling import borrowing
 from .fit_kernels import assemble_fit, fit_pose
 from .proof_kernels import locate, workspace
 from .reading_kernels import carry, read, worst_on_pieces
@@ -27,7 +28,7 @@ def finish(count, faces, contacts, model, rotation, translation, work, informati
     fitted, shifted = frames[0], vectors[3]
     fitted[:] = rotation
     shifted[:] = translation
-    fit_pose(count, faces, contacts, model, FIT_STEPS, fitted, shifted, readings)
+    fit_pose(count, faces, contacts, model, FIT_STEPS, fitted, shifted, work)
     carry(count, points, measured, fitted, shifted, x, u)
     worst = read(count, faces, faces, x, u, model, contacts, readings)
     if worst <= 1.0 + EXACT:
@@ -38,7 +39,7 @@ def finish(count, faces, contacts, model, rotation, translation, work, informati
     return weigh(count, faces, contacts, model, rotation, translation, work, information)
 
 
-@njit(cache=True)
+@borrowing
 def weigh(count, faces, contacts, model, rotation, translation, work, information):
     """The least-squares misfit of a pose, and its information about small motions, in place."""
     readings, rows = work[0], work[3]
@@ -46,8 +47,11 @@ def weigh(count, faces, contacts, model, rotation, translation, work, informatio
     system, gradient = work[4][0], work[5][0]
     carry(count, contacts[0], contacts[1], rotation, translation, x, u)
     read(count, faces, faces, x, u, model, contacts, readings)
-    cost = assemble_fit(True, count, faces, x, u, model, contacts, readings, system, gradient)
-    assemble_fit(False, count, faces, x, u, model, contacts, readings, system, gradient)
+    space = work[8][2]
+    cost = assemble_fit(
+        True, count, faces, x, u, model, contacts, readings, system, gradient, space
+    )
+    assemble_fit(False, count, faces, x, u, model, contacts, readings, system, gradient, space)
     for a in range(6):
         for b in range(6):
             information[a, b] = system[max(a, b), min(a, b)]
@@ -62,7 +66,7 @@ def start_pose(count, faces, contacts, model, half_angles, middles, rotation, tr
     return angle
 
 
-@njit(cache=True)
+@borrowing
 def settle(count, faces, contacts, model, ball, angle, most, rotation, translation, work, stack):
     """Judge an interpretation as far as a budget of boxes allows.
 
@@ -102,7 +106,7 @@ def settle(count, faces, contacts, model, ball, angle, most, rotation, translati
     if verdict == BESIDE:
         locate(count, faces, faces, model, contacts, rotation, ball, angle, work)
     # The ball is not about the pose that the verdict left.
-    angle = min(np.pi, angle + turn_between(ball, rotation, np.empty(3)))
+    angle = min(np.pi, angle + turn_between(ball, rotation, work[5][3]))
     return search_poses(
         count, faces, contacts, model, angle, most, rotation, translation, work, stack
     )

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from .compiling import borrowing
 from .reading_kernels import ARC, NO_CONE, UNKNOWN_NORMAL, nearest_in_cone, nearest_on_feature
 from .region_kernels import remainder
 
 
-@njit(cache=True)
+@borrowing
 def _reach_of(lever, direction, centre, inverse, root, angle, row):
     """How far the poses of a region move a contact along a direction: mean and half range."""
     a0, a1, a2 = lever[0], lever[1], lever[2]
@@ -25,7 +25,7 @@ def _reach_of(lever, direction, centre, inverse, root, angle, row):
     return mean, np.sqrt(max(square, 0.0)) + remainder(lever, direction, root, angle)
 
 
-@njit(cache=True)
+@borrowing
 def possible(x, u, lever, f, reach, chord, sine, model, angle, region, root, row, near):
     """Whether any pose of a region puts a contact on a feature.
 

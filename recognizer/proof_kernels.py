@@ -14,6 +14,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from .compiling import borrowing
 from .motion_kernels import solve
 from .polygon_kernels import EDGE, INSIDE
 from .reading_kernels import ARC, NO_CONE, cone_support
@@ -30,7 +31,7 @@ ROUNDING = 1e-6
 """By how much a proof has to hold, as a share of its sum of bounds: far above rounding."""
 
 
-@njit(cache=True)
+@borrowing
 def set_levers(count, faces, x, pivot, levers):
     """The mean of the contacts, and each contact less it."""
     pivot[:] = 0.0
@@ -48,7 +49,7 @@ def set_levers(count, faces, x, pivot, levers):
             levers[i, k] = x[i, k] - pivot[k]
 
 
-@njit(cache=True)
+@borrowing
 def _add(lever, direction, weight, residual, system, gradient):
     """A weighted residual along a direction: a motion changes it by -w . (a x d) - s . d."""
     a0, a1, a2 = lever
@@ -60,7 +61,7 @@ def _add(lever, direction, weight, residual, system, gradient):
             system[a, b] += weight * row[a] * row[b]
 
 
-@njit(cache=True)
+@borrowing
 def assemble(count, faces, levers, u, normals, contacts, readings, weights, system, gradient):
     """Normal equations of the weighted readings, in place."""
     _, _, reaches, chords, sines = contacts
@@ -116,7 +117,7 @@ def assemble(count, faces, levers, u, normals, contacts, readings, weights, syst
             system[2, 2] += weight * (1.0 - u2 * u2)
 
 
-@njit(cache=True)
+@borrowing
 def set_multipliers(
     count, faces, levers, u, normals, contacts, readings, weights, step, multipliers
 ):
@@ -184,7 +185,7 @@ def set_multipliers(
             twists[i, 2] = weight * (misses[i] * e2 + t2)
 
 
-@njit(cache=True)
+@borrowing
 def _support(direction, corners, start, stop):
     """The most that any corner of a polygon has along a direction."""
     most = -np.inf
@@ -194,7 +195,7 @@ def _support(direction, corners, start, stop):
     return most
 
 
-@njit(cache=True)
+@borrowing
 def plain_margin(count, faces, targets, x, u, levers, model, contacts, readings, proof):
     """By how much multipliers ask for more than the bounds allow, at the pose alone.
 
@@ -279,7 +280,7 @@ def plain_margin(count, faces, targets, x, u, levers, model, contacts, readings,
     return margin, total
 
 
-@njit(cache=True)
+@borrowing
 def motion_allowance(slope, form, angle, ball_angle, reach, region, product, root):
     """By how much motions within a region can lower what multipliers ask for.
 
@@ -322,6 +323,17 @@ def motion_allowance(slope, form, angle, ball_angle, reach, region, product, roo
 
 
 @njit(cache=True)
+def barrier_workspace():
+    """Work space of `feasibility_kernels.seek_feasible`: systems, vectors, and a trial pose."""
+    return (
+        (np.empty((7, 7)), np.zeros((7, 7))),
+        (np.empty(7), np.empty(7), np.empty(7)),
+        (np.empty(6), np.empty(6), np.empty(6), np.empty(3), np.empty(3), np.empty(3)),
+        (np.empty((3, 3)), np.empty(3)),
+    )
+
+
+@njit(cache=True)
 def workspace(count):
     """Work space of `judge` for a number of contacts."""
     readings = (
@@ -342,10 +354,11 @@ def workspace(count):
         (np.empty(6), np.empty(6), np.empty(3), np.empty(3)),
         (np.empty((3, 3)), np.empty((3, 3))),
         (np.empty((count, 3)), np.empty((count, 3)), np.empty(6), np.empty((3, 3))),
+        barrier_workspace(),
     )
 
 
-@njit(cache=True)
+@borrowing
 def reach_of(model, contacts, pivot):
     """A shift of the contacts' mean that no pose within the bounds exceeds, metres.
 
@@ -353,11 +366,16 @@ def reach_of(model, contacts, pivot):
     is no farther from the centroid than a contact and what was inside the object are apart, and
     neither is a place of the support plane.
     """
-    away = np.sqrt(((pivot - model[5]) ** 2).sum())
-    return 8.0 * model[6] + 5.0 * contacts[2].max() + away
+    away = 0.0
+    for k in range(3):
+        away += (pivot[k] - model[5][k]) ** 2
+    most = 0.0
+    for reach in contacts[2]:
+        most = max(most, reach)
+    return 8.0 * model[6] + 5.0 * most + np.sqrt(away)
 
 
-@njit(cache=True)
+@borrowing
 def locate(count, faces, targets, model, contacts, rotation, ball, angle, work):
     """`region_kernels.bound_region` at a pose that has been read."""
     x, u, levers, _ = work[3]
@@ -381,7 +399,7 @@ def locate(count, faces, targets, model, contacts, rotation, ball, angle, work):
     )
 
 
-@njit(cache=True)
+@borrowing
 def solve_in_ball(system, gradient, factor, step, rotation, ball, angle, radius, offset):
     """The weighted fit's step, held to the ball: beyond it no reading can be met."""
     # As little as keeps the system regular where no contact bears on a freedom.
@@ -405,7 +423,7 @@ def solve_in_ball(system, gradient, factor, step, rotation, ball, angle, radius,
         hold *= 4.0
 
 
-@njit(cache=True)
+@borrowing
 def disprove(count, faces, targets, model, contacts, rotation, ball, angle, always, work):
     """Try to prove, by the weights in the work space, that no pose meets all bounds.
 
@@ -425,7 +443,7 @@ def disprove(count, faces, targets, model, contacts, rotation, ball, angle, alwa
         Whether it is proved; an angle that bounds every rotation within the bounds, from this pose,
         if the region was renewed, else pi.
     """
-    readings, region, forms, rows, systems, vectors, _, proof = work
+    readings, region, forms, rows, systems, vectors, _, proof, _ = work
     x, u, levers, weights = rows
     system, factor = systems
     gradient, step, pivot = vectors[0], vectors[1], vectors[2]
@@ -449,7 +467,8 @@ def disprove(count, faces, targets, model, contacts, rotation, ball, angle, alwa
         return True, 0.0
     if margin <= 0.0:
         return False, bound
-    longest = min(np.pi, np.sqrt((offset**2).sum()) + angle)
+    off = np.sqrt(offset[0] ** 2 + offset[1] ** 2 + offset[2] ** 2)
+    longest = min(np.pi, off + angle)
     margin -= motion_allowance(
         slope,
         form,

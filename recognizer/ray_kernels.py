@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from .compiling import borrowing
 
 
-@njit(cache=True)
+@borrowing
 def first_hits(origins, directions, triangles, distances, hits):
     """The first triangle each ray meets (Moeller and Trumbore).
 

@@ -9,9 +9,9 @@ convex pieces of a concave face.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from .polygon_kernels import CORNER, nearest_in_polygon
+from .compiling import borrowing
+from .polygon_kernels import CORNER, foot_in_polygon, nearest_in_polygon
 
 UNKNOWN_NORMAL = 2.0
 """A chord no two unit vectors exceed: a bound this wide says nothing."""
@@ -20,45 +20,44 @@ NO_CONE, RAY, ARC, CONE_END = 0, 1, 2, 3
 face; the angle's sine off the plane of an arc; the distance to an arc's end."""
 
 
-@njit(cache=True)
-def nearest_on_arc(u, first, last, axis):
+@borrowing
+def nearest_on_arc(u, first, last):
     """Where on an arc between two unit normals ``u`` is nearest.
 
     Args:
         u: (3,) unit vector.
         first: (3,) one end.
         last: (3,) other end, less than half a turn on.
-        axis: (3,) written in place: the unit normal of the arc's plane, ``first x last``.
 
     Returns:
-        The signed distance off the plane, and 0 within the arc, 1 at its first end, 2 at its last.
+        The signed distance off the plane; 0 within the arc, 1 at its first end, 2 at its last; and
+        the unit normal of the arc's plane, ``first x last``.
     """
-    axis[0] = first[1] * last[2] - first[2] * last[1]
-    axis[1] = first[2] * last[0] - first[0] * last[2]
-    axis[2] = first[0] * last[1] - first[1] * last[0]
-    length = np.sqrt(axis[0] ** 2 + axis[1] ** 2 + axis[2] ** 2)
-    for k in range(3):
-        axis[k] /= length
-    off = axis[0] * u[0] + axis[1] * u[1] + axis[2] * u[2]
+    a0 = first[1] * last[2] - first[2] * last[1]
+    a1 = first[2] * last[0] - first[0] * last[2]
+    a2 = first[0] * last[1] - first[1] * last[0]
+    length = np.sqrt(a0 * a0 + a1 * a1 + a2 * a2)
+    a0, a1, a2 = a0 / length, a1 / length, a2 / length
+    off = a0 * u[0] + a1 * u[1] + a2 * u[2]
     # axis x first points along the arc at its start, last x axis back along it at its end.
     after = (
-        u[0] * (axis[1] * first[2] - axis[2] * first[1])
-        + u[1] * (axis[2] * first[0] - axis[0] * first[2])
-        + u[2] * (axis[0] * first[1] - axis[1] * first[0])
+        u[0] * (a1 * first[2] - a2 * first[1])
+        + u[1] * (a2 * first[0] - a0 * first[2])
+        + u[2] * (a0 * first[1] - a1 * first[0])
     )
     before = (
-        u[0] * (last[1] * axis[2] - last[2] * axis[1])
-        + u[1] * (last[2] * axis[0] - last[0] * axis[2])
-        + u[2] * (last[0] * axis[1] - last[1] * axis[0])
+        u[0] * (last[1] * a2 - last[2] * a1)
+        + u[1] * (last[2] * a0 - last[0] * a2)
+        + u[2] * (last[0] * a1 - last[1] * a0)
     )
     if after >= 0.0 and before >= 0.0:
-        return off, 0
+        return off, 0, (a0, a1, a2)
     near_first = u[0] * first[0] + u[1] * first[1] + u[2] * first[2]
     near_last = u[0] * last[0] + u[1] * last[1] + u[2] * last[2]
-    return off, 1 if near_first >= near_last else 2
+    return off, 1 if near_first >= near_last else 2, (a0, a1, a2)
 
 
-@njit(cache=True)
+@borrowing
 def nearest_in_cone(u, normals, start, stop, direction):
     """How a unit vector misses a cone of normals.
 
@@ -83,12 +82,11 @@ def nearest_in_cone(u, normals, start, stop, direction):
             for k in range(3):
                 direction[k] /= gap
         return RAY, gap
-    axis = np.empty(3)
     if count > 2:
         inside = True
         for k in range(start, stop):
             after = k + 1 if k + 1 < stop else start
-            off, _ = nearest_on_arc(u, normals[k], normals[after], axis)
+            off, _, _ = nearest_on_arc(u, normals[k], normals[after])
             inside &= off >= 0.0
         if inside:
             return NO_CONE, 0.0
@@ -96,15 +94,17 @@ def nearest_in_cone(u, normals, start, stop, direction):
     kind, miss = NO_CONE, 0.0
     for k in range(start, stop if count > 2 else start + 1):
         after = k + 1 if k + 1 < stop else start
-        off, where = nearest_on_arc(u, normals[k], normals[after], axis)
+        off, where, axis = nearest_on_arc(u, normals[k], normals[after])
         if where == 0:
             if off > 0.0 and count > 2:
                 continue
             near = np.sqrt(max(0.0, 1.0 - off * off))
             if near > best:
                 best, kind, miss = near, ARC, abs(off)
-                for i in range(3):
-                    direction[i] = axis[i] if off > 0.0 else -axis[i]
+                sign = 1.0 if off > 0.0 else -1.0
+                direction[0] = sign * axis[0]
+                direction[1] = sign * axis[1]
+                direction[2] = sign * axis[2]
         else:
             end = k if where == 1 else after
             near = u[0] * normals[end, 0] + u[1] * normals[end, 1] + u[2] * normals[end, 2]
@@ -116,10 +116,9 @@ def nearest_in_cone(u, normals, start, stop, direction):
     return kind, miss
 
 
-@njit(cache=True)
+@borrowing
 def cone_support(direction, normals, start, stop):
     """The most that any normal of a cone has along a direction; see `nearest_in_cone`."""
-    axis = np.empty(3)
     best = -np.inf
     for k in range(start, stop):
         along = 0.0
@@ -134,14 +133,14 @@ def cone_support(direction, normals, start, stop):
     inside = stop - start > 2
     for k in range(start, stop if stop - start > 2 else start + 1):
         after = k + 1 if k + 1 < stop else start
-        off, where = nearest_on_arc(direction, normals[k], normals[after], axis)
+        off, where, _ = nearest_on_arc(direction, normals[k], normals[after])
         inside &= off >= 0.0
         if where == 0:
             best = max(best, np.sqrt(max(0.0, length - off * off)))
     return np.sqrt(length) if inside else best
 
 
-@njit(cache=True)
+@borrowing
 def nearest_on_feature(x, normal, offset, corners, start, stop, nearest):
     """`nearest_in_polygon` for polygons of any number of corners; one is a point."""
     if stop - start > 1:
@@ -155,7 +154,7 @@ def nearest_on_feature(x, normal, offset, corners, start, stop, nearest):
     return squared, height, CORNER
 
 
-@njit(cache=True)
+@borrowing
 def read(count, faces, targets, x, u, model, contacts, readings):
     """How far each contact is from its feature's hull and each normal from its cone, in place.
 
@@ -177,7 +176,6 @@ def read(count, faces, targets, x, u, model, contacts, readings):
     normals, offsets, _, start, corners, _, _, cone_start, cone_normals = model
     _, _, reaches, chords, sines = contacts
     gaps, lengths, heights, regions, kinds, misses, directions = readings
-    nearest = np.empty(3)
     worst = 0.0
     for i in range(count):
         f = faces[i]
@@ -185,13 +183,13 @@ def read(count, faces, targets, x, u, model, contacts, readings):
             continue
         p = targets[i]
         squared, height, region = nearest_on_feature(
-            x[i], normals[f], offsets[f], corners, start[p], start[p + 1], nearest
+            x[i], normals[f], offsets[f], corners, start[p], start[p + 1], gaps[i]
         )
         lengths[i] = np.sqrt(squared)
         heights[i] = height
         regions[i] = region
         for k in range(3):
-            gaps[i, k] = x[i, k] - nearest[k]
+            gaps[i, k] = x[i, k] - gaps[i, k]
         worst = max(worst, lengths[i] / reaches[i])
         kinds[i] = NO_CONE
         if chords[i] >= UNKNOWN_NORMAL:
@@ -208,7 +206,7 @@ def read(count, faces, targets, x, u, model, contacts, readings):
     return worst
 
 
-@njit(cache=True)
+@borrowing
 def worst_on_pieces(count, faces, targets, x, model, contacts, readings):
     """The largest distance of a contact from its feature itself, concave faces too, in bounds.
 
@@ -220,7 +218,6 @@ def worst_on_pieces(count, faces, targets, x, model, contacts, readings):
     normals, offsets, first, start, corners = model[0], model[1], model[2], model[3], model[4]
     reaches = contacts[2]
     lengths = readings[1]
-    nearest = np.empty(3)
     worst, where = 0.0, 0
     for i in range(count):
         f = faces[i]
@@ -230,8 +227,8 @@ def worst_on_pieces(count, faces, targets, x, model, contacts, readings):
         if targets[i] == f and first[f + 1] - first[f] > 1:
             squared = np.inf
             for k in range(first[f], first[f + 1]):
-                gap, _, _ = nearest_in_polygon(
-                    x[i], normals[f], offsets[f], corners, start[k], start[k + 1], nearest
+                gap, _, _, _ = foot_in_polygon(
+                    x[i], normals[f], offsets[f], corners, start[k], start[k + 1]
                 )
                 squared = min(squared, gap)
         share = np.sqrt(squared) / reaches[i]
@@ -240,7 +237,7 @@ def worst_on_pieces(count, faces, targets, x, model, contacts, readings):
     return worst, where
 
 
-@njit(cache=True)
+@borrowing
 def carry(count, points, measured, rotation, translation, x, u):
     """The first contacts and normals, world frame, into the object's frame: ``x``, ``u``."""
     for i in range(count):

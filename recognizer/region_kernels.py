@@ -13,6 +13,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from .compiling import borrowing
 from .polygon_kernels import INSIDE
 from .reading_kernels import RAY
 
@@ -26,7 +27,7 @@ STIFF_ROUNDING = 2e-14
 """What an inverse may lose, as a share, for each unit of its condition: a hundred roundings."""
 
 
-@njit(cache=True)
+@borrowing
 def invert_symmetric(matrix, inverse, factor, slope, root):
     """Invert a positive definite (k, k) matrix by Cholesky; returns whether it is one.
 
@@ -68,7 +69,7 @@ def invert_symmetric(matrix, inverse, factor, slope, root):
     return True
 
 
-@njit(cache=True)
+@borrowing
 def largest_eigenvalue(m):
     """Of a symmetric (3, 3) matrix, or of a larger one's first block, rounded up (Smith 1961)."""
     off = m[0, 1] * m[0, 1] + m[0, 2] * m[0, 2] + m[1, 2] * m[1, 2]
@@ -86,7 +87,7 @@ def largest_eigenvalue(m):
     return mean + 2.0 * size * np.cos(angle) + 1e-7 * size
 
 
-@njit(cache=True)
+@borrowing
 def square_root(spread, root):
     """Cholesky factor of a (3, 3) form, lower, into ``root``; null directions come out null."""
     for a in range(3):
@@ -102,7 +103,7 @@ def square_root(spread, root):
                 root[b, a] = 0.0
 
 
-@njit(cache=True)
+@borrowing
 def remainder(lever, direction, root, angle):
     """How far a turn within a region can move a lever's end along a direction beyond linear.
 
@@ -137,7 +138,7 @@ def remainder(lever, direction, root, angle):
     return 0.5 * bent + angle * angle / 6.0 * linear
 
 
-@njit(cache=True)
+@borrowing
 def turn_between(one, other, turn):
     """The rotation vector of ``one^T other`` into (3,) ``turn``; returns its length, radians."""
     trace = 0.0
@@ -155,7 +156,7 @@ def turn_between(one, other, turn):
     return angle
 
 
-@njit(cache=True)
+@borrowing
 def ball_radius(angle, longest):
     """Radius, in rotation vectors of lengths up to ``longest``, that holds a ball of rotations.
 
@@ -190,7 +191,7 @@ def region_workspace(count):
     )
 
 
-@njit(cache=True)
+@borrowing
 def _add_row(lever, direction, value, limit, owner, at, table):
     """Note a place along a direction, which a motion lowers by w . (a x d) + s . d."""
     rows, numbers, owners = table
@@ -207,7 +208,7 @@ def _add_row(lever, direction, value, limit, owner, at, table):
     owners[at] = owner
 
 
-@njit(cache=True)
+@borrowing
 def _note_places(count, faces, targets, x, levers, model, reaches, readings, table):
     """Places of contacts that are bounded on both sides, as rows; returns how many.
 
@@ -217,42 +218,39 @@ def _note_places(count, faces, targets, x, levers, model, reaches, readings, tab
     """
     normals, start, corners = model[0], model[3], model[4]
     gaps, _, heights, regions, _, _, _ = readings
-    direction = np.empty(3)
     used = 0
     for i in range(count):
         f = faces[i]
         if f < 0:
             continue
-        _add_row(levers[i], normals[f], heights[i], reaches[i], i, used, table)
+        m = (normals[f, 0], normals[f, 1], normals[f, 2])
+        _add_row(levers[i], m, heights[i], reaches[i], i, used, table)
         used += 1
         if regions[i] == INSIDE:
             continue
-        out = 0.0
-        for k in range(3):
-            direction[k] = gaps[i, k] - heights[i] * normals[f, k]
-            out += direction[k] ** 2
-        out = np.sqrt(out)
+        d0 = gaps[i, 0] - heights[i] * normals[f, 0]
+        d1 = gaps[i, 1] - heights[i] * normals[f, 1]
+        d2 = gaps[i, 2] - heights[i] * normals[f, 2]
+        out = np.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
         if out < 0.5 * reaches[i]:
             continue
-        most = 0.0
-        for k in range(3):
-            direction[k] /= out
-            most += direction[k] * (x[i, k] - gaps[i, k])
+        d0, d1, d2 = d0 / out, d1 / out, d2 / out
+        most = d0 * (x[i, 0] - gaps[i, 0])
+        most += d1 * (x[i, 1] - gaps[i, 1])
+        most += d2 * (x[i, 2] - gaps[i, 2])
         least = most
         for c in range(start[targets[i]], start[targets[i] + 1]):
-            along = 0.0
-            for k in range(3):
-                along += direction[k] * corners[c, k]
+            along = d0 * corners[c, 0] + d1 * corners[c, 1] + d2 * corners[c, 2]
             least = min(least, along)
         half = 0.5 * (most - least)
-        _add_row(levers[i], direction, half + out, half + reaches[i], i, used, table)
+        _add_row(levers[i], (d0, d1, d2), half + out, half + reaches[i], i, used, table)
         table[1][4, used] = out - reaches[i]
         table[1][5, used] = -2.0 * (half + reaches[i])
         used += 1
     return used
 
 
-@njit(cache=True)
+@borrowing
 def _narrow(used, table, centre, inverse):
     """Bound places beyond an edge from behind too, by how far the region lets them come back.
 
@@ -280,7 +278,7 @@ def _narrow(used, table, centre, inverse):
     return True
 
 
-@njit(cache=True)
+@borrowing
 def bound_region(
     count,
     faces,
@@ -454,7 +452,7 @@ def bound_region(
     return result, min(about, result + np.sqrt(centre[0] ** 2 + centre[1] ** 2 + centre[2] ** 2))
 
 
-@njit(cache=True)
+@borrowing
 def _raise_weights(count, faces, u, normals, kinds, chords, used, table, middle, cone_weights):
     """Count each reading by how large the fit of this round leaves it."""
     rows, numbers, _ = table

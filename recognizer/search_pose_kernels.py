@@ -11,8 +11,10 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from .align_kernels import diagonalise
+from .compiling import borrowing
 from .feasibility_kernels import seek_feasible
-from .motion_kernels import move
+from .motion_kernels import copy_pose, copy_rotation, move
 from .proof_kernels import locate
 from .reading_kernels import carry, read, worst_on_pieces
 from .verdict_kernels import BESIDE, EXACT, FEASIBLE, REJECTED, UNDECIDED, judge
@@ -35,7 +37,7 @@ WORTHWHILE = 0.3
 """A region is cut instead of the box it came from, if its volume is below this share of it."""
 
 
-@njit(cache=True)
+@borrowing
 def _volume(region):
     """Of the ellipsoid of rotations, up to a factor: of half the sides of the box around it."""
     m = region[1]
@@ -47,19 +49,48 @@ def _volume(region):
     return np.sqrt(max(determinant, 0.0))
 
 
-@njit(cache=True)
-def _box_region(region, axes, centre, half):
-    """The box around a region's rotations, about the pose that the region is about."""
-    values, vectors = np.linalg.eigh(region[1][:3, :3].copy())
-    axes[:] = vectors
+@borrowing
+def _box_region(region, axes, centre, half, form):
+    """The box around a region's rotations, about the pose that the region is about.
+
+    Whatever the axes, a box of these sides holds the region; (3, 3) ``form`` is work space.
+    """
+    for a in range(3):
+        for b in range(3):
+            form[a, b] = region[1][a, b]
+    diagonalise(form, axes)
     for k in range(3):
-        half[k] = np.sqrt(max(values[k], 0.0)) * (1.0 + 1e-9)
+        square = 0.0
         centre[k] = 0.0
         for a in range(3):
-            centre[k] += vectors[a, k] * region[2][a]
+            centre[k] += axes[a, k] * region[2][a]
+            for b in range(3):
+                square += axes[a, k] * region[1][a, b] * axes[b, k]
+        half[k] = np.sqrt(max(square, 0.0)) * (1.0 + 1e-9)
 
 
-@njit(cache=True)
+@borrowing
+def _copy_weights(count, weights, kept):
+    for i in range(count):
+        for k in range(2):
+            kept[i, k] = weights[i, k]
+
+
+@borrowing
+def _copy_box(count, box, at, chosen, weights, stack):
+    """Write a box of the stack to another place of it, with these polygons and weights."""
+    turns, shifts, axes, centres, halves, targets, kept, _ = stack
+    copy_pose(turns[box], shifts[box], turns[at], shifts[at])
+    copy_rotation(axes[box], axes[at])
+    for k in range(3):
+        centres[at, k] = centres[box, k]
+        halves[at, k] = halves[box, k]
+    for i in range(count):
+        targets[at, i] = chosen[i]
+    _copy_weights(count, weights, kept[at])
+
+
+@borrowing
 def search_poses(count, faces, contacts, model, angle, most, rotation, translation, work, stack):
     """Search all poses of an interpretation, from one that `judge` may have left.
 
@@ -81,31 +112,37 @@ def search_poses(count, faces, contacts, model, angle, most, rotation, translati
     first = model[2]
     readings, region = work[0], work[1]
     x, u, _, weights = work[3]
-    turns, shifts, axes, centres, halves, targets, kept = stack
-    held = np.empty(3)
-    ball = np.empty((3, 3))
-    turned, shifted = np.empty((3, 3)), np.empty(3)
-    best_turn, best_shift = rotation.copy(), translation.copy()
-    step = np.zeros(6)
-    pivot = np.zeros(3)
+    turns, shifts, axes, centres, halves, targets, kept, space = stack
+    (ball, turned, best_turn), (shifted, best_shift, held, pivot), step = space
+    form = work[2][0]
+    chosen = targets[STACK]
+    copy_pose(rotation, translation, best_turn, best_shift)
+    step[:] = 0.0
+    pivot[:] = 0.0
     used = 0
     for i in range(count):
         if faces[i] >= 0:
-            pivot += contacts[0][i]
             used += 1
-    pivot /= max(used, 1)
-    turns[0], shifts[0] = rotation, translation
+            for k in range(3):
+                pivot[k] += contacts[0][i, k]
+    for k in range(3):
+        pivot[k] /= max(used, 1)
+    copy_pose(rotation, translation, turns[0], shifts[0])
     if angle < 1.5:
-        _box_region(region, axes[0], centres[0], halves[0])
+        _box_region(region, axes[0], centres[0], halves[0], form)
     else:
-        axes[0], centres[0], halves[0] = np.eye(3), 0.0, min(angle, np.pi)
-    targets[0, :count] = faces[:count]
+        for a in range(3):
+            for b in range(3):
+                axes[0, a, b] = 1.0 if a == b else 0.0
+        centres[0], halves[0] = 0.0, min(angle, np.pi)
+    for i in range(count):
+        targets[0, i] = faces[i]
     height = 1
     open_boxes = False
     least = np.inf
     for looked in range(most):
         if height == 0:
-            rotation[:], translation[:] = best_turn, best_shift
+            copy_pose(best_turn, best_shift, rotation, translation)
             return (UNDECIDED if open_boxes else REJECTED), looked
         top = height - 1
         nearest = 0.0
@@ -128,10 +165,12 @@ def search_poses(count, faces, contacts, model, angle, most, rotation, translati
                 held[k] += turns[top, a, k] * (pivot[a] - shifts[top, a])
         move(turns[top], shifts[top], step, held, 1.0, rotation, translation)
         box_angle = min(diagonal, np.pi)
-        ball[:] = rotation
-        chosen = targets[top, :count].copy()
-        # Their mean is about 1; none may vanish for good.
-        weights[:count] = kept[top, :count] + FLOOR
+        copy_rotation(rotation, ball)
+        for i in range(count):
+            chosen[i] = targets[top, i]
+            # Their mean is about 1; none may vanish for good.
+            for k in range(2):
+                weights[i, k] = kept[top, i, k] + FLOOR
         outcome, bound, worst, where = judge(
             count,
             faces,
@@ -153,11 +192,11 @@ def search_poses(count, faces, contacts, model, angle, most, rotation, translati
             continue
         if worst < least:
             least = worst
-            best_turn[:], best_shift[:] = rotation, translation
+            copy_pose(rotation, translation, best_turn, best_shift)
         small = diagonal < FINEST
-        kept[top, :count] = weights[:count]
+        _copy_weights(count, weights, kept[top])
         if outcome == UNDECIDED and (diagonal < FINE or looked % SEEK == 0 or worst < NEARLY):
-            turned[:], shifted[:] = rotation, translation
+            copy_pose(rotation, translation, turned, shifted)
             outcome = seek_feasible(
                 count, faces, chosen, contacts, model, 60, True, ball, bound, turned, shifted, work
             )
@@ -165,7 +204,7 @@ def search_poses(count, faces, contacts, model, angle, most, rotation, translati
                 height = top
                 continue
             if outcome == FEASIBLE:
-                rotation[:], translation[:] = turned, shifted
+                copy_pose(turned, shifted, rotation, translation)
                 worst, where = worst_on_pieces(
                     count, faces, chosen, work[3][0], model, contacts, readings
                 )
@@ -180,56 +219,57 @@ def search_poses(count, faces, contacts, model, angle, most, rotation, translati
                 # The region is to be about the verdict's pose again.
                 carry(count, contacts[0], contacts[1], rotation, translation, x, u)
                 read(count, faces, chosen, x, u, model, contacts, readings)
-                weights[:count] = kept[top, :count]
+                _copy_weights(count, kept[top], weights)
                 locate(count, faces, chosen, model, contacts, rotation, ball, bound, work)
         if outcome == BESIDE:
             # Every bound is met on the hulls, but this contact is beside its concave face.
             f = faces[where]
             if height + first[f + 1] - first[f] > STACK:
                 return UNDECIDED, most
-            height = top
-            for p in range(first[f], first[f + 1]):
-                turns[height], shifts[height] = turns[top], shifts[top]
-                axes[height], centres[height] = axes[top], centres[top]
-                halves[height] = halves[top]
-                targets[height, :count] = chosen
-                targets[height, where] = p
-                kept[height, :count] = weights[:count]
-                height += 1
+            # The last first: it may take this box's own place.
+            for p in range(first[f + 1] - 1, first[f] - 1, -1):
+                at = top + p - first[f]
+                _copy_box(count, top, at, chosen, weights, stack)
+                targets[at, where] = p
+            height = top + first[f + 1] - first[f]
             continue
         if height == STACK:
             return UNDECIDED, most
         # The region that the verdict left may be smaller than the box.
         if _volume(region) < WORTHWHILE * halves[top, 0] * halves[top, 1] * halves[top, 2]:
-            turns[top], shifts[top] = rotation, translation
-            _box_region(region, axes[top], centres[top], halves[top])
+            copy_pose(rotation, translation, turns[top], shifts[top])
+            _box_region(region, axes[top], centres[top], halves[top], form)
         longest = 0
         for k in range(1, 3):
             if halves[top, k] > halves[top, longest]:
                 longest = k
         halves[top, longest] *= 0.5
-        turns[height], shifts[height] = turns[top], shifts[top]
-        axes[height], centres[height] = axes[top], centres[top]
-        halves[height] = halves[top]
-        targets[height, :count] = chosen
-        kept[top, :count] = weights[:count]
-        kept[height, :count] = weights[:count]
+        _copy_weights(count, weights, kept[top])
+        _copy_box(count, top, height, chosen, weights, stack)
         centres[top, longest] -= halves[top, longest]
         centres[height, longest] += halves[top, longest]
         height += 1
-    rotation[:], translation[:] = best_turn, best_shift
+    copy_pose(best_turn, best_shift, rotation, translation)
     return UNDECIDED, most
 
 
 @njit(cache=True)
 def box_stack(count):
-    """A stack of boxes for `search_poses`: poses, axes, centres, half sides, polygons, weights."""
+    """A stack of boxes for `search_poses`: poses, axes, centres, half sides, polygons, weights.
+
+    Behind them work space; a last row of polygons is part of it.
+    """
     return (
         np.empty((STACK, 3, 3)),
         np.empty((STACK, 3)),
         np.empty((STACK, 3, 3)),
         np.empty((STACK, 3)),
         np.empty((STACK, 3)),
-        np.empty((STACK, count), np.int64),
+        np.empty((STACK + 1, count), np.int64),
         np.empty((STACK, count, 2)),
+        (
+            (np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))),
+            (np.empty(3), np.empty(3), np.empty(3), np.empty(3)),
+            np.empty(6),
+        ),
     )

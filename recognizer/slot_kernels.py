@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from .compiling import borrowing
 from .polygon_kernels import nearest_in_polygon
 from .region_kernels import largest_eigenvalue, remainder, square_root
 
@@ -33,7 +34,7 @@ def cut_levels(solid_faces):
     )
 
 
-@njit(cache=True)
+@borrowing
 def span_along(lever, direction, region, root, angle, row):
     """How far a lever's end can go along a direction within a region, from the region's pose."""
     inverse, centre = region[1], region[2]
@@ -66,7 +67,7 @@ def farthest_move(lever, region, angle, farthest):
     return min(far + 0.5 * angle * angle * length, farthest)
 
 
-@njit(cache=True)
+@borrowing
 def held_along(place, direction, row, faces, x, model, reaches, turn):
     """How far a place can go along a direction, as contacts are held to their features.
 
@@ -129,7 +130,7 @@ def set_slab(slot, face, model, place, low, high, size):
     corners[first + 3] = foot + size * (one - other)
 
 
-@njit(cache=True)
+@borrowing
 def set_point(slot, corner, normal, model):
     """Make a slot's feature a corner."""
     normals, offsets, _, start, corners, _, _, cone_start, cone_normals = model
@@ -139,7 +140,7 @@ def set_point(slot, corner, normal, model):
     corners[start[slot]] = corner
 
 
-@njit(cache=True)
+@borrowing
 def _order_choices(count, choices, ends, place, model):
     """Sort the faces of a cut, the nearest plane last: choices are taken from there."""
     normals, offsets = model[0], model[1]
@@ -222,7 +223,7 @@ def list_exits(
     return found, away
 
 
-@njit(cache=True)
+@borrowing
 def cut_path(level, row, place, found, away, contacts, model, pose, levels):
     """Note a place of a free path in the object as a cut: it leaves through one of some faces.
 
@@ -283,7 +284,7 @@ def cut_support(
     set_point(slot, corner, normal, model)
 
 
-@njit(cache=True)
+@borrowing
 def cut_approach(level, row, contact, face, direction, least, contacts, levels):
     """A contact seen from behind: its normal is within some angle of where the finger came from.
 

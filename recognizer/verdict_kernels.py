@@ -9,9 +9,9 @@ multipliers of a proof, see `proof_kernels`.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from .motion_kernels import move
+from .compiling import borrowing
+from .motion_kernels import copy_pose, copy_rotation, move
 from .proof_kernels import disprove, locate
 from .reading_kernels import ARC, NO_CONE, carry, read, worst_on_pieces
 
@@ -26,7 +26,7 @@ LONGEST_TURN = 0.3
 """The longest step of the fit, radians: its linear picture holds no farther."""
 
 
-@njit(cache=True)
+@borrowing
 def _raise_weights(count, faces, contacts, readings, weights):
     """Lawson: a reading counts by how large it is."""
     _, _, reaches, chords, sines = contacts
@@ -46,7 +46,7 @@ def _raise_weights(count, faces, contacts, readings, weights):
         weights[i, 1] *= 2.0 * count / total
 
 
-@njit(cache=True)
+@borrowing
 def judge(
     count, faces, targets, contacts, model, ball, angle, most, warm, rotation, translation, work
 ):
@@ -72,7 +72,7 @@ def judge(
         The verdict; the angle of the ball; the largest reading in bounds; for `BESIDE` the contact.
     """
     points, measured, reaches, _, _ = contacts
-    readings, region, _, rows, _, vectors, frames, _ = work
+    readings, region, _, rows, _, vectors, frames, _, _ = work
     x, u, _, weights = rows
     _, step, pivot, shifted = vectors
     turned = frames[0]
@@ -94,13 +94,13 @@ def judge(
             )
             if bound < 0.0:
                 return REJECTED, 0.0, worst, 0
-            step[:] = centre
+            for a in range(6):
+                step[a] = centre[a]
             move(rotation, translation, step, pivot, 1.0, turned, shifted)
-            rotation[:] = turned
-            translation[:] = shifted
+            copy_pose(turned, shifted, rotation, translation)
             if about < angle:
                 angle = about
-                ball[:] = rotation
+                copy_rotation(rotation, ball)
             turn = np.sqrt(step[0] ** 2 + step[1] ** 2 + step[2] ** 2)
             shift = np.sqrt(step[3] ** 2 + step[4] ** 2 + step[5] ** 2)
             settled += 1
@@ -117,7 +117,7 @@ def judge(
             return REJECTED, 0.0, worst, 0
         if bound < angle:
             angle = bound
-            ball[:] = rotation
+            copy_rotation(rotation, ball)
         if taken == most:
             return UNDECIDED, angle, worst, 0
         taken += 1
@@ -126,5 +126,4 @@ def judge(
             for a in range(6):
                 step[a] *= LONGEST_TURN / turn
         move(rotation, translation, step, pivot, 1.0, turned, shifted)
-        rotation[:] = turned
-        translation[:] = shifted
+        copy_pose(turned, shifted, rotation, translation)

@@ -255,12 +255,12 @@ def test_the_miss_of_a_cone_is_the_angle_to_the_nearest_of_its_normals() -> None
 
 
 def test_the_nearest_place_on_an_arc_is_that_of_a_dense_sampling() -> None:
-    rng, axis = np.random.default_rng(2), np.empty(3)
+    rng = np.random.default_rng(2)
     seen: Counter[int] = Counter()
     for _ in range(500):
         first, turn = direction(rng), Rotation.from_rotvec(rng.uniform(0.05, 3.0) * direction(rng))
         last, u = turn.apply(first), direction(rng)
-        off, where = nearest_on_arc(u, first, last, axis)
+        off, where, axis = nearest_on_arc(u, first, last)
         share = np.linspace(0.0, 1.0, 2001)[:, None]
         angle = angle_between(first, last)
         arc = (np.sin((1 - share) * angle) * first + np.sin(share * angle) * last) / np.sin(angle)
@@ -627,7 +627,7 @@ def test_no_multipliers_ask_for_more_than_bounds_and_motions_allow() -> None:
         work, _ = read_at(sample, rotation, translation)
         bound, _ = locate(*sample.question, rotation, ball, angle, work)
         count, faces, _, model, contacts = sample.question
-        readings, region, forms, (x, u, levers, _), *_, proof = work
+        readings, region, forms, (x, u, levers, _), *_, proof, _ = work
         pulls, twists, slope, form = proof
         # What pulls a contact may be anything. At the truth its own gap asks for most. A normal is
         # twisted along its own miss.
