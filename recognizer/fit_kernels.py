@@ -12,9 +12,7 @@ from .reading_kernels import ARC, NO_CONE, carry, read
 
 
 @borrowing
-def assemble_fit(
-    bounded, count, faces, x, u, model, contacts, readings, system, gradient, space
-):
+def assemble_fit(bounded, count, faces, x, u, model, contacts, readings, system, gradient, space):
     """Normal equations of the least-squares misfit at one pose; returns the misfit.
 
     Each contact counts its height above the plane of its face, how far beyond its bound it lies

@@ -2,8 +2,8 @@
 
 Every assignment narrows the features left to later contacts, first by pairs (forward checking on
 bit sets), then, where many completions are left, by the pose that the assigned contacts allow: none
-ends the branch, and a region of poses rules out features of later contacts one by one. A leaf gets
-a verdict that is a pose or a proof.
+ends the branch, and where there is one, features of later contacts are ruled out one by one (see
+`look_ahead_kernels`). A leaf gets a verdict that is a pose or a proof.
 """
 
 from __future__ import annotations
@@ -14,12 +14,11 @@ from numba import njit
 from .align_kernels import middle_translation
 from .cell_kernels import facing, narrow_in_cell
 from .cell_search_kernels import passing_cells, view_cell
+from .compiling import borrowing
+from .look_ahead_kernels import drop_beyond_region, drop_rejected
 from .mask_kernels import bit_index, narrow, pair_readings
 from .pose_kernels import finish, settle, start_pose
-from .possible_kernels import possible
 from .proof_kernels import locate, workspace
-from .reading_kernels import carry
-from .region_kernels import square_root
 from .search_pose_kernels import box_stack
 from .verdict_kernels import FEASIBLE, REJECTED, judge
 
@@ -27,6 +26,10 @@ _ONE = np.uint64(1)
 _NONE = np.uint64(0)
 VAGUE = 1.2
 """An angle (radians) of rotations too wide for a verdict within the tree to be worth its time."""
+FEW = 8
+"""Completions of a branch that are tried one by one: looking ahead would cost as many verdicts."""
+PATIENCE = 16
+"""Leaves of a model that are tried before it is looked ahead: most models have fewer in all."""
 INNER_STEPS = 2
 """Steps of a verdict within the tree, where it may stay open."""
 NODES, VERDICTS, INNER_REJECTED, BOXES, CUT, LEAVES_TRIED = 0, 1, 2, 3, 4, 5
@@ -39,6 +42,18 @@ def _larger(array, size):
     grown = np.empty((size,) + array.shape[1:], array.dtype)
     grown[: len(array)] = array
     return grown
+
+
+@borrowing
+def count_ways(depth, sizes):
+    """How many later contacts have no feature left, and how many ways the others have together."""
+    empty = 0
+    completions = 1.0
+    for j in range(depth, len(sizes)):
+        if sizes[j] == 0:
+            empty += 1
+        completions *= max(sizes[j], 1)
+    return empty, completions
 
 
 @njit(cache=True)
@@ -114,6 +129,7 @@ def search_model(
     work = workspace(n)
     stack = box_stack(n)
     row, near, root = np.empty(6), np.empty(3), np.empty((3, 3))
+    held = (np.empty(n, np.int64), np.empty((3, 3)), np.empty((3, 3)), np.empty(3))
     ball = work[6][1]
     nodes = np.zeros(n, np.int64)
     counts = np.zeros(COUNTS, np.int64)
@@ -321,43 +337,39 @@ def search_model(
                         continue
                     posed[depth] = depth
                     turns[depth], shifts[depth], angles[depth] = rotation, translation, angle
-                    square_root(work[1][0], root)
-                    x, u, levers = work[3][0], work[3][1], work[3][2]
-                    pivot = work[5][2]
-                    empty = 0
-                    carry(n, points, contacts[1], rotation, translation, x, u)
-                    for j in range(depth, n):
-                        some = False
-                        for k in range(3):
-                            levers[j, k] = x[j, k] - pivot[k]
-                        for w in range(words):
-                            bits = left[depth, j, w]
-                            kept = bits
-                            while bits != _NONE:
-                                lowest = bits & (~bits + _ONE)
-                                bits ^= lowest
-                                if not possible(
-                                    x[j],
-                                    u[j],
-                                    levers[j],
-                                    w * 64 + bit_index(lowest),
-                                    contacts[2][j],
-                                    contacts[3][j],
-                                    contacts[4][j],
-                                    model,
-                                    angle,
-                                    work[1],
-                                    root,
-                                    row,
-                                    near,
-                                ):
-                                    kept ^= lowest
-                            left[depth, j, w] = kept
-                            some |= kept != _NONE
-                        if not some:
-                            empty += 1
-                            if nulls[depth] + empty > spare:
-                                break
+                    drop_beyond_region(
+                        depth,
+                        contacts,
+                        model,
+                        rotation,
+                        translation,
+                        angle,
+                        left[depth],
+                        sizes[depth],
+                        work,
+                        (row, near, root),
+                    )
+                    empty, completions = count_ways(depth, sizes[depth])
+                    if (
+                        nulls[depth] + empty <= spare
+                        and completions > FEW
+                        and counts[LEAVES_TRIED] >= PATIENCE
+                    ):
+                        counts[VERDICTS] += drop_rejected(
+                            depth,
+                            faces,
+                            nulls[depth] == spare,
+                            contacts,
+                            model,
+                            turns[depth],
+                            shifts[depth],
+                            angle,
+                            left[depth],
+                            sizes[depth],
+                            work,
+                            held,
+                        )
+                        empty, _ = count_ways(depth, sizes[depth])
                     if nulls[depth] + empty > spare:
                         counts[INNER_REJECTED] += 1
                         continue

@@ -1,0 +1,152 @@
+"""Compiled look ahead: what later contacts can be on, given where the assigned ones put the object.
+
+First feature by feature, by the region of poses alone; then, where many completions are left, by a
+verdict on the assigned contacts and one more. A feature that such a verdict rejects is rejected for
+the whole branch, at the price of one leaf.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .compiling import borrowing
+from .mask_kernels import bit_index
+from .motion_kernels import copy_pose, copy_rotation
+from .possible_kernels import possible
+from .reading_kernels import carry
+from .region_kernels import square_root
+from .verdict_kernels import REJECTED, judge
+
+_ONE = np.uint64(1)
+_NONE = np.uint64(0)
+STEPS = 6
+"""Steps of a verdict on one more contact, as on a leaf."""
+
+
+@borrowing
+def drop_beyond_region(
+    depth, contacts, model, rotation, translation, angle, domains, sizes, work, space
+):
+    """Drop features of later contacts that no pose of a region puts them on.
+
+    Args:
+        depth: how many contacts are assigned.
+        contacts: see `search_kernels.search_model`.
+        model: likewise.
+        rotation: (3, 3) object to world, of the pose that the region in the work space is about.
+        translation: (3,) likewise.
+        angle: bounds every rotation of the region, radians.
+        domains: (n, w) bit sets of the features left to each contact, narrowed in place.
+        sizes: (n,) how many, written in place from ``depth`` on.
+        work: see `proof_kernels.workspace`.
+        space: (6,), (3,) and (3, 3) work space.
+    """
+    row, near, root = space
+    n, words = domains.shape
+    region, pivot = work[1], work[5][2]
+    x, u, levers, _ = work[3]
+    square_root(region[0], root)
+    carry(n, contacts[0], contacts[1], rotation, translation, x, u)
+    for j in range(depth, n):
+        for k in range(3):
+            levers[j, k] = x[j, k] - pivot[k]
+        sizes[j] = 0
+        for w in range(words):
+            bits = domains[j, w]
+            while bits != _NONE:
+                lowest = bits & (~bits + _ONE)
+                bits ^= lowest
+                if possible(
+                    x[j],
+                    u[j],
+                    levers[j],
+                    w * 64 + bit_index(lowest),
+                    contacts[2][j],
+                    contacts[3][j],
+                    contacts[4][j],
+                    model,
+                    angle,
+                    region,
+                    root,
+                    row,
+                    near,
+                ):
+                    sizes[j] += 1
+                else:
+                    domains[j, w] ^= lowest
+
+
+@borrowing
+def drop_rejected(
+    depth, faces, certain, contacts, model, rotation, translation, angle, domains, sizes, work, held
+):
+    """Drop features of later contacts that no pose allows together with the assigned ones.
+
+    Contacts with one feature left count as assigned if no more may be on none.
+
+    Args:
+        depth: how many contacts are assigned.
+        faces: (n,) their features, -1 for none.
+        certain: whether every later contact is on some feature.
+        contacts: see `search_kernels.search_model`.
+        model: likewise.
+        rotation: (3, 3) object to world, of a pose that ...
+        translation: (3,) likewise.
+        angle: ... no rotation within the bounds is farther from than this, radians.
+        domains: (n, w) bit sets of the features left to each contact, narrowed in place.
+        sizes: (n,) how many, likewise.
+        work: see `proof_kernels.workspace`.
+        held: (n,) features, (3, 3), (3, 3) and (3,) work space.
+
+    Returns:
+        How many verdicts it took.
+    """
+    trial, ball, turned, shifted = held
+    n, words = domains.shape
+    verdicts = 0
+    for i in range(n):
+        trial[i] = faces[i] if i < depth else -1
+        if i >= depth and certain and sizes[i] == 1:
+            trial[i] = _only(domains[i])
+    for j in range(depth, n):
+        if sizes[j] < 2:
+            continue
+        for w in range(words):
+            bits = domains[j, w]
+            while bits != _NONE:
+                lowest = bits & (~bits + _ONE)
+                bits ^= lowest
+                trial[j] = w * 64 + bit_index(lowest)
+                copy_pose(rotation, translation, turned, shifted)
+                copy_rotation(rotation, ball)
+                verdicts += 1
+                verdict, _, _, _ = judge(
+                    n,
+                    trial,
+                    trial,
+                    contacts,
+                    model,
+                    ball,
+                    angle,
+                    STEPS,
+                    False,
+                    turned,
+                    shifted,
+                    work,
+                )
+                if verdict == REJECTED:
+                    domains[j, w] ^= lowest
+                    sizes[j] -= 1
+        trial[j] = _only(domains[j]) if certain and sizes[j] == 1 else -1
+        if certain and sizes[j] == 0:
+            break
+    return verdicts
+
+
+@borrowing
+def _only(domain):
+    """The only member of a bit set."""
+    for w in range(len(domain)):
+        if domain[w] != _NONE:
+            return w * 64 + bit_index(domain[w])
+    return -1
