@@ -10,23 +10,21 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from .cell_kernels import facing, narrow_in_cell
+from .cell_kernels import facing
 from .compiling import borrowing
-from .mask_kernels import bit_index, narrow
+from .forward_kernels import check_forward, take_lowest
 
-_ONE = np.uint64(1)
-_NONE = np.uint64(0)
 TRIES = 400
 """Branches after which a cell passes without an answer."""
 
 
-@njit(cache=True)
+@borrowing
 def rotation_of(vector, rotation):
     """The rotation (3, 3) of a rotation vector (3,), in place (Rodrigues)."""
-    angle = np.sqrt((vector**2).sum())
+    x, y, z = vector[0], vector[1], vector[2]
+    angle = np.sqrt(x * x + y * y + z * z)
     first = np.sin(angle) / angle if angle > 1e-9 else 1.0
     second = (1.0 - np.cos(angle)) / (angle * angle) if angle > 1e-6 else 0.5
-    x, y, z = vector
     square = angle * angle
     rotation[0, 0] = 1.0 - second * (square - x * x)
     rotation[1, 1] = 1.0 - second * (square - y * y)
@@ -51,48 +49,28 @@ def view_cell(rotation, points, normals, between, facings):
                     between[i, j, a] += rotation[b, a] * (points[j, b] - points[i, b])
 
 
-@njit(cache=True)
-def _passes(
-    contacts,
-    errors,
-    model,
-    half_angles,
-    packed,
-    domains,
-    spare,
-    switches,
-    readings,
-    angle,
-    between,
-    facings,
-    space,
-):
+@borrowing
+def _passes(contacts, model, domains, spare, pairs, cell, facings, space):
     """Whether some interpretation passes all pairs in a cell, or none was excluded in time."""
-    left, sizes, untried, faces, nulls, near = space
+    left, sizes, untried, faces, nulls, null_left, near = space
     n, words = domains.shape
     lost = 0
     for j in range(n):
-        left[0, j] = domains[j]
+        for w in range(words):
+            left[0, j, w] = domains[j, w]
         sizes[0, j] = facing(
-            facings[j], contacts[3][j], contacts[4][j], angle, model, left[0, j], near
+            facings[j], contacts[3][j], contacts[4][j], cell[1], model, left[0, j], near
         )
         lost += sizes[0, j] == 0
     if lost > spare:
         return False
     level, tries = 0, 0
-    untried[0] = left[0, 0]
     nulls[0] = 0
-    null_left = np.zeros(n, np.bool_)
     null_left[0] = spare > 0
+    for w in range(words):
+        untried[0, w] = left[0, 0, w]
     while level >= 0:
-        face = -1
-        for w in range(words):
-            bits = untried[level, w]
-            if bits != _NONE:
-                lowest = bits & (~bits + _ONE)
-                untried[level, w] = bits ^ lowest
-                face = w * 64 + bit_index(lowest)
-                break
+        face = take_lowest(untried[level])
         if face < 0:
             if not null_left[level]:
                 level -= 1
@@ -104,45 +82,26 @@ def _passes(
         tries += 1
         if tries > TRIES:
             return True
-        empty = 0
-        for j in range(depth, n):
-            some = sizes[level, j]
-            if face < 0:
-                left[depth, j] = left[level, j]
-            else:
-                some = narrow(
-                    face,
-                    packed,
-                    half_angles[face],
-                    readings[level, j],
-                    errors[level],
-                    errors[j],
-                    switches,
-                    left[level, j],
-                    left[depth, j],
-                )
-                if some:
-                    some = narrow_in_cell(
-                        face,
-                        packed,
-                        half_angles,
-                        model[0],
-                        between[level, j],
-                        readings[level, j, 4],
-                        angle,
-                        left[depth, j],
-                    )
-            sizes[depth, j] = some
-            empty += some == 0
-            if nulls[depth] + empty > spare:
-                break
+        empty, _ = check_forward(
+            level,
+            face,
+            depth,
+            spare - nulls[depth],
+            pairs,
+            cell,
+            left[level],
+            sizes[level],
+            left[depth],
+            sizes[depth],
+        )
         if nulls[depth] + empty > spare:
             continue
         if depth == n:
             return True
         level = depth
-        untried[level] = left[level, level]
         null_left[level] = nulls[level] < spare
+        for w in range(words):
+            untried[level, w] = left[level, level, w]
     return False
 
 
@@ -179,8 +138,10 @@ def passing_cells(
         np.zeros((n, words), np.uint64),
         np.full(n, -1, np.int64),
         np.zeros(n + 1, np.int64),
+        np.zeros(n, np.bool_),
         np.empty(3),
     )
+    pairs = (packed, half_angles, errors, switches, model[0], readings)
     between, facings, rotation = np.empty((n, n, 3)), np.empty((n, 3)), np.empty((3, 3))
     # Breadth first, so that a budget ends on cells of one size.
     middles, half = np.zeros((1, 3)), np.pi
@@ -208,21 +169,8 @@ def passing_cells(
                 if angle < np.pi:
                     rotation_of(cut[kept], rotation)
                     view_cell(rotation, contacts[0], contacts[1], between, facings)
-                    if not _passes(
-                        contacts,
-                        errors,
-                        model,
-                        half_angles,
-                        packed,
-                        domains,
-                        spare,
-                        switches,
-                        readings,
-                        angle,
-                        between,
-                        facings,
-                        space,
-                    ):
+                    cell = (between, angle)
+                    if not _passes(contacts, model, domains, spare, pairs, cell, facings, space):
                         continue
                 kept += 1
         middles, passed = cut[:kept].copy(), kept

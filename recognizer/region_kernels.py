@@ -14,7 +14,7 @@ import numpy as np
 from numba import njit
 
 from .compiling import borrowing
-from .polygon_kernels import INSIDE
+from .place_kernels import add_places, narrow_places, note_places, raise_places, widen_places
 from .reading_kernels import RAY
 
 ROUNDS = 5
@@ -186,96 +186,9 @@ def region_workspace(count):
         (np.empty((6, 6)), np.empty((6, 6)), np.zeros((6, 6))),
         (np.empty(6), np.empty(6), np.empty(3)),
         np.empty((3, 3)),
-        (np.empty((2 * count, 6)), np.empty((6, 2 * count)), np.empty(2 * count, np.int64)),
+        (np.empty((2 * count, 10)), np.empty((6, 2 * count))),
         np.empty(count),
     )
-
-
-@borrowing
-def _add_row(lever, direction, value, limit, owner, at, table):
-    """Note a place along a direction, which a motion lowers by w . (a x d) + s . d."""
-    rows, numbers, owners = table
-    d0, d1, d2 = direction[0], direction[1], direction[2]
-    rows[at, 0] = lever[1] * d2 - lever[2] * d1
-    rows[at, 1] = lever[2] * d0 - lever[0] * d2
-    rows[at, 2] = lever[0] * d1 - lever[1] * d0
-    rows[at, 3], rows[at, 4], rows[at, 5] = d0, d1, d2
-    numbers[0, at] = value
-    numbers[1, at] = limit
-    numbers[2, at] = 1.0
-    numbers[4, at] = 0.0
-    numbers[5, at] = 0.0
-    owners[at] = owner
-
-
-@borrowing
-def _note_places(count, faces, targets, x, levers, model, reaches, readings, table):
-    """Places of contacts that are bounded on both sides, as rows; returns how many.
-
-    The height over the face's plane, whatever of the face is nearest; and, for a contact that lies
-    outside it, the place along the gap, which the face bounds ahead and behind. For these the
-    excess and its least possible value are noted too: see `_narrow`.
-    """
-    normals, start, corners = model[0], model[3], model[4]
-    gaps, _, heights, regions, _, _, _ = readings
-    used = 0
-    for i in range(count):
-        f = faces[i]
-        if f < 0:
-            continue
-        m = (normals[f, 0], normals[f, 1], normals[f, 2])
-        _add_row(levers[i], m, heights[i], reaches[i], i, used, table)
-        used += 1
-        if regions[i] == INSIDE:
-            continue
-        d0 = gaps[i, 0] - heights[i] * normals[f, 0]
-        d1 = gaps[i, 1] - heights[i] * normals[f, 1]
-        d2 = gaps[i, 2] - heights[i] * normals[f, 2]
-        out = np.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
-        if out < 0.5 * reaches[i]:
-            continue
-        d0, d1, d2 = d0 / out, d1 / out, d2 / out
-        most = d0 * (x[i, 0] - gaps[i, 0])
-        most += d1 * (x[i, 1] - gaps[i, 1])
-        most += d2 * (x[i, 2] - gaps[i, 2])
-        least = most
-        for c in range(start[targets[i]], start[targets[i] + 1]):
-            along = d0 * corners[c, 0] + d1 * corners[c, 1] + d2 * corners[c, 2]
-            least = min(least, along)
-        half = 0.5 * (most - least)
-        _add_row(levers[i], (d0, d1, d2), half + out, half + reaches[i], i, used, table)
-        table[1][4, used] = out - reaches[i]
-        table[1][5, used] = -2.0 * (half + reaches[i])
-        used += 1
-    return used
-
-
-@borrowing
-def _narrow(used, table, centre, inverse):
-    """Bound places beyond an edge from behind too, by how far the region lets them come back.
-
-    Returns:
-        Whether every one can come back inside at all.
-    """
-    rows, numbers, _ = table
-    for r in range(used):
-        if numbers[5, r] == 0.0:
-            continue
-        mean = 0.0
-        square = 0.0
-        for a in range(6):
-            mean += rows[r, a] * centre[a]
-            for b in range(6):
-                square += rows[r, a] * inverse[a, b] * rows[r, b]
-        rest = numbers[3, r] - numbers[1, r]
-        least = numbers[4, r] - mean - np.sqrt(max(square, 0.0)) - rest
-        if least > 0.0:
-            return False
-        if least > numbers[5, r]:
-            numbers[5, r] = min(least, -1e-12)
-            numbers[0, r] = numbers[4, r] - 0.5 * numbers[5, r]
-            numbers[1, r] = -0.5 * numbers[5, r]
-    return True
 
 
 @borrowing
@@ -328,8 +241,7 @@ def bound_region(
     spread, inverse, centre, systems, slopes, root, table, cone_weights = region
     system, trial, factor = systems
     slope, middle, offset = slopes
-    rows, numbers, owners = table
-    used = _note_places(count, faces, targets, x, levers, model, contacts[2], readings, table)
+    used = note_places(count, faces, targets, x, levers, model, contacts[2], readings, table)
     for i in range(count):
         cone_weights[i] = 1.0
     # Known beforehand: the ball.
@@ -360,19 +272,8 @@ def bound_region(
             slope[a] = -offset[a] / (ball_angle * ball_angle)
             system[a, a] = 1.0 / (ball_angle * ball_angle)
             system[3 + a, 3 + a] = 1.0 / (reach * reach)
-        for r in range(used):
-            # In a bound widened by its remainder, a place adds at most its weight.
-            wide = numbers[1, r] + remainder(levers[owners[r]], rows[r, 3:], root, result)
-            numbers[3, r] = wide
-            weight = numbers[2, r]
-            value = numbers[0, r] / wide
-            allowed += weight * (1.0 - value * value)
-            share = weight / (wide * wide)
-            pull = weight * value / wide
-            for a in range(6):
-                slope[a] -= pull * rows[r, a]
-                for b in range(a + 1):
-                    system[a, b] += share * rows[r, a] * rows[r, b]
+        widen_places(used, table, root, result)
+        allowed += add_places(used, table, system, slope)
         # A normal's |u' - m|^2 is 2 - 2 m . u'. Its form in w holds up to 1 - cos t >=
         # t^2 (1 - t^2 / 12) / 2, its slope up to sinc t >= 1 - t^2 / 6.
         bend = max(0.0, 1.0 - square / 12.0)
@@ -446,7 +347,7 @@ def bound_region(
         result = min(result, far + near)
         if idle == PATIENCE:
             break
-        if not _narrow(used, table, centre, inverse):
+        if not narrow_places(used, table, centre, inverse):
             return -1.0, 0.0
         _raise_weights(count, faces, u, normals, kinds, chords, used, table, middle, cone_weights)
     return result, min(about, result + np.sqrt(centre[0] ** 2 + centre[1] ** 2 + centre[2] ** 2))
@@ -455,16 +356,9 @@ def bound_region(
 @borrowing
 def _raise_weights(count, faces, u, normals, kinds, chords, used, table, middle, cone_weights):
     """Count each reading by how large the fit of this round leaves it."""
-    rows, numbers, _ = table
-    total = 0.0
-    amount = 0
-    for r in range(used):
-        value = numbers[0, r]
-        for a in range(6):
-            value -= rows[r, a] * middle[a]
-        numbers[2, r] *= min(abs(value) / numbers[3, r], 10.0) + 0.05
-        total += numbers[2, r]
-        amount += 1
+    numbers = table[1]
+    total = raise_places(used, table, middle)
+    amount = used
     w0, w1, w2 = middle[0], middle[1], middle[2]
     for i in range(count):
         f = faces[i]

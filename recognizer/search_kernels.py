@@ -12,11 +12,12 @@ import numpy as np
 from numba import njit
 
 from .align_kernels import middle_translation
-from .cell_kernels import facing, narrow_in_cell
+from .cell_kernels import facing
 from .cell_search_kernels import passing_cells, view_cell
 from .compiling import borrowing
+from .forward_kernels import check_forward, take_lowest
 from .look_ahead_kernels import drop_beyond_region, drop_rejected
-from .mask_kernels import bit_index, narrow, pair_readings
+from .mask_kernels import pair_readings
 from .pose_kernels import finish, settle, start_pose
 from .proof_kernels import locate, workspace
 from .search_pose_kernels import box_stack
@@ -142,6 +143,7 @@ def search_model(
     found_proven = np.empty(16, np.bool_)
     between = np.empty((n, n, 3))
     facings = np.empty((n, 3))
+    pairs = (packed, half_angles, errors, switches, model[0], readings)
     in_cell = finest > 0.0
     cells, cell_angles = np.empty((1, 3, 3)), np.zeros(1)
     if in_cell:
@@ -169,8 +171,9 @@ def search_model(
             most_cells,
         )
     for turn in range(len(cells)):
-        cell_angle = cell_angles[turn]
+        cell_angle = -1.0
         if in_cell:
+            cell_angle = cell_angles[turn]
             view_cell(cells[turn], points, contacts[1], between, facings)
         for m in range(len(prefixes)):
             for j in range(n):
@@ -196,43 +199,25 @@ def search_model(
                 if f < 0:
                     nulls[start] += 1
                     continue
-                for j in range(start, n):
-                    sizes[start, j] = narrow(
-                        f,
-                        packed,
-                        half_angles[f],
-                        readings[i, j],
-                        errors[i],
-                        errors[j],
-                        switches,
-                        left[start, j],
-                        left[start, j],
-                    )
-                    if in_cell:
-                        sizes[start, j] = narrow_in_cell(
-                            f,
-                            packed,
-                            half_angles,
-                            model[0],
-                            between[i, j],
-                            readings[i, j, 4],
-                            cell_angle,
-                            left[start, j],
-                        )
+                check_forward(
+                    i,
+                    f,
+                    start,
+                    n,
+                    pairs,
+                    (between, cell_angle),
+                    left[start],
+                    sizes[start],
+                    left[start],
+                    sizes[start],
+                )
             posed[start] = -1
             level = start
             untried[level] = left[level, level]
             null_left[level] = nulls[level] < spare
             while level >= start:
                 # The next feature of this contact, or none at all.
-                face = -1
-                for w in range(words):
-                    bits = untried[level, w]
-                    if bits != _NONE:
-                        lowest = bits & (~bits + _ONE)
-                        untried[level, w] = bits ^ lowest
-                        face = w * 64 + bit_index(lowest)
-                        break
+                face = take_lowest(untried[level])
                 if face < 0:
                     if not null_left[level]:
                         level -= 1
@@ -247,41 +232,18 @@ def search_model(
                     break
                 counts[NODES] += 1
                 nodes[level] += 1
-                empty = 0
-                completions = 1.0
-                for j in range(depth, n):
-                    if face >= 0:
-                        some = narrow(
-                            face,
-                            packed,
-                            half_angles[face],
-                            readings[level, j],
-                            errors[level],
-                            errors[j],
-                            switches,
-                            left[level, j],
-                            left[depth, j],
-                        )
-                        if in_cell and some:
-                            some = narrow_in_cell(
-                                face,
-                                packed,
-                                half_angles,
-                                model[0],
-                                between[level, j],
-                                readings[level, j, 4],
-                                cell_angle,
-                                left[depth, j],
-                            )
-                    else:
-                        left[depth, j] = left[level, j]
-                        some = sizes[level, j]
-                    sizes[depth, j] = some
-                    if some == 0:
-                        empty += 1
-                        if nulls[depth] + empty > spare:
-                            break
-                    completions *= max(some, 1)
+                empty, completions = check_forward(
+                    level,
+                    face,
+                    depth,
+                    spare - nulls[depth],
+                    pairs,
+                    (between, cell_angle),
+                    left[level],
+                    sizes[level],
+                    left[depth],
+                    sizes[depth],
+                )
                 if nulls[depth] + empty > spare:
                     continue
                 posed[depth] = posed[level]
