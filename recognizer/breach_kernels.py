@@ -93,12 +93,13 @@ def pierced_paths(paths, pose, bound, model, solid_faces, broken, worst_places, 
         )
         if clearance > distance:
             broken[count] = s
-            worst_places[count] = found
+            for k in range(3):
+                worst_places[count, k] = found[k]
             count += 1
     return count
 
 
-@borrowing
+@njit(cache=True)
 def move_inside(place, clearance, model, solid_faces, nearest, near, trial):
     """Move a place of a path, within the radius around it that is free, into the object.
 

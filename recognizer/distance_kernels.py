@@ -57,7 +57,8 @@ def signed_distance(x, model, faces, nearest, near):
             )
             if gap < squared:
                 squared = gap
-                nearest[:] = near
+                for k in range(3):
+                    nearest[k] = near[k]
             seen += _solid_angle(x, corners, start[p], start[p + 1])
     return -np.sqrt(squared) if seen > np.pi else np.sqrt(squared)
 
@@ -86,7 +87,10 @@ def deepest(one, other, clearance, grain, bound, model, faces, place, point, nea
         The signed distance there, infinity if the whole path is out of reach.
     """
     centre = model[5]
-    length = np.sqrt(((other - one) ** 2).sum())
+    squared = 0.0
+    for k in range(3):
+        squared += (other[k] - one[k]) ** 2
+    length = np.sqrt(squared)
     # Only the part within reach of the solid.
     about, away = 0.0, 0.0
     for k in range(3):
@@ -107,7 +111,8 @@ def deepest(one, other, clearance, grain, bound, model, faces, place, point, nea
         distance = signed_distance(point, model, faces, nearest, near)
         if distance < least:
             least = distance
-            place[:] = point
+            for k in range(3):
+                place[k] = point[k]
         if at >= last:
             break
         room = distance - clearance

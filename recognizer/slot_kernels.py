@@ -130,7 +130,7 @@ def set_slab(slot, face, model, place, low, high, size):
     corners[first + 3] = foot + size * (one - other)
 
 
-@borrowing
+@njit(cache=True)
 def set_point(slot, corner, normal, model):
     """Make a slot's feature a corner."""
     normals, offsets, _, start, corners, _, _, cone_start, cone_normals = model
@@ -140,7 +140,7 @@ def set_point(slot, corner, normal, model):
     corners[start[slot]] = corner
 
 
-@borrowing
+@njit(cache=True)
 def _order_choices(count, choices, ends, place, model):
     """Sort the faces of a cut, the nearest plane last: choices are taken from there."""
     normals, offsets = model[0], model[1]
@@ -223,7 +223,7 @@ def list_exits(
     return found, away
 
 
-@borrowing
+@njit(cache=True)
 def cut_path(level, row, place, found, away, contacts, model, pose, levels):
     """Note a place of a free path in the object as a cut: it leaves through one of some faces.
 
@@ -284,7 +284,7 @@ def cut_support(
     set_point(slot, corner, normal, model)
 
 
-@borrowing
+@njit(cache=True)
 def cut_approach(level, row, contact, face, direction, least, contacts, levels):
     """A contact seen from behind: its normal is within some angle of where the finger came from.
 

@@ -385,7 +385,7 @@ def test_the_fit_brings_a_pose_back_that_slid_off_its_faces() -> None:
             20,
             rotation,
             translation,
-            workspace(len(contacts))[0],
+            workspace(len(contacts)),
         )
         end = RigidTransform.from_components(translation, Rotation.from_matrix(rotation))
         assert not check(BAR, start, contacts, touches.faces).passed
