@@ -20,7 +20,8 @@ from ..recognizer import (
 )
 from .library import LibrarySource, load_library
 from .observation import Observation, ObservationLayout
-from .scene import Placement, ProbeScene
+from .placement import AcrossPlane
+from .scene import ProbeScene
 from .sensor import RaySensor, SensorNoise, Touch
 
 INCH = 0.0254
@@ -139,7 +140,7 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
         self.recognizer = Recognizer(self.library, tolerance=tolerance, limits=limits)
         largest = max(model.diameter for model in self.library)
         self.half_width = HALF_WIDTH * largest
-        self._placement = Placement(offset=0.2 * self.half_width)
+        self._placement = AcrossPlane(offset=0.2 * self.half_width)
         self._sensor = RaySensor(noise, REACH * largest)
         self._scenes: dict[str, ProbeScene] = {}
         self._max_probes = max_probes

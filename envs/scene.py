@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import RigidTransform, Rotation
+from scipy.spatial.transform import RigidTransform
 
 from ..recognizer import Polyhedron
 
@@ -104,29 +104,3 @@ class ProbeScene:
                 ends[ray] = starts_world[ray] + depth * directions_world[ray]
                 normals[ray] = normal
         return RayReadings(outcomes, ends, normals)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Placement:
-    """How an object is placed: any orientation, across the plane."""
-
-    offset: float
-    """Largest distance of its centroid from the origin along the plane, metres."""
-    sunk: tuple[float, float] = (0.1, 0.5)
-    """Least and greatest share of its height below the plane."""
-
-    def draw(self, rng: np.random.Generator, model: Polyhedron) -> RigidTransform:
-        """A pose, model to world, uniform in orientation, offset and share sunk."""
-        rotation = Rotation.random(rng=rng)
-        heights = rotation.apply(model.vertices)[:, 2]
-        centroid = rotation.apply(model.centroid)
-        sunk = rng.uniform(*self.sunk)
-        distance, bearing = self.offset * np.sqrt(rng.random()), rng.uniform(0.0, 2.0 * np.pi)
-        shift = np.array(
-            [
-                distance * np.cos(bearing) - centroid[0],
-                distance * np.sin(bearing) - centroid[1],
-                -heights.min() - sunk * np.ptp(heights),
-            ]
-        )
-        return RigidTransform.from_components(shift, rotation)

@@ -13,8 +13,9 @@ from gymnasium.utils.env_checker import check_env
 
 import palpate.envs
 from palpate.envs.noise import uniform_in_ball, uniform_in_cone
+from palpate.envs.placement import AcrossPlane
 from palpate.envs.probe_env import ProbeEnv
-from palpate.envs.scene import OBJECT, PLANE, Placement, ProbeScene
+from palpate.envs.scene import OBJECT, PLANE, ProbeScene
 from palpate.envs.sensor import RaySensor, SensorNoise, triad_directions
 from palpate.policies import RandomProbe
 from palpate.recognizer import Polyhedron
@@ -178,7 +179,7 @@ def test_bounds_below_the_simulations_rounding_are_refused():
 
 def test_the_object_lies_across_the_plane(housing):
     rng = np.random.default_rng(0)
-    placement = Placement(offset=0.01)
+    placement = AcrossPlane(offset=0.01)
     for _ in range(200):
         pose = placement.draw(rng, housing)
         heights = pose.apply(housing.vertices)[:, 2]
@@ -201,7 +202,7 @@ def test_rays_meet_what_geometry_says_they_meet(env):
     for model in env.library:
         scene = ProbeScene(model)
         for _ in range(20):
-            scene.place(Placement(offset=0.02).draw(rng, model))
+            scene.place(AcrossPlane(offset=0.02).draw(rng, model))
             for x, y in rng.uniform(-0.08, 0.08, (10, 2)):
                 directions = triad_directions(rng.uniform(-1, 1))
                 starts = np.array([x, y, 0.0]) - 0.5 * directions
@@ -229,7 +230,7 @@ def test_what_the_sensor_reports_is_within_the_bounds_it_states(env):
     for model in env.library:
         scene, sensor = ProbeScene(model), RaySensor(noise, 0.5)
         for _ in range(100):
-            scene.place(Placement(offset=0.01).draw(rng, model))
+            scene.place(AcrossPlane(offset=0.01).draw(rng, model))
             x, y = rng.uniform(-0.03, 0.03, 2)
             touch = sensor.touch(scene, x, y, 0.3, rng)
             directions = triad_directions(0.3)
