@@ -23,7 +23,7 @@ the truth for certain.
 
 from .belief import Belief, Search
 from .comparison import PoseDifference, pose_difference
-from .contacts import Contacts
+from .contacts import ANYTHING, EDGE, FACE, VERTEX, Contacts
 from .free_space import FreeSpace
 from .hypotheses import Hypothesis, PoseTolerance
 from .library import load_folder
@@ -35,6 +35,10 @@ from .support import SupportPlane
 from .tree import Constraints
 
 __all__ = [
+    "ANYTHING",
+    "EDGE",
+    "FACE",
+    "VERTEX",
     "Belief",
     "Constraints",
     "Contacts",

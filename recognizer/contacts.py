@@ -11,6 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 UNIT_NORMAL_TOLERANCE = 1e-3
 """How far from 1 the length of a given normal may be; text files round to four digits or so."""
 
+ANYTHING, FACE, EDGE, VERTEX = 0, 1, 2, 3
+"""What a contact may be on: nothing is known of it, a face, a convex edge, a convex vertex."""
+
 APPROACH_ERROR = 0.01
 """How far off the direction of an approach may be, radians."""
 
@@ -36,6 +39,8 @@ class Contacts:
     approaches: NDArray[np.float64]
     """(n, 3) or (n, 2) unit directions in which the probe moved when it touched, world frame,
     within `APPROACH_ERROR`; rows of zeros where that is unknown. The surface faced it."""
+    kinds: NDArray[np.int8]
+    """(n,) what each is on: `ANYTHING`, `FACE`, `EDGE` or `VERTEX`."""
 
     def __init__(
         self,
@@ -45,6 +50,7 @@ class Contacts:
         position_error: ArrayLike,
         normal_error: ArrayLike | None = None,
         approaches: ArrayLike | None = None,
+        kinds: ArrayLike | None = None,
     ) -> None:
         """Check and hold contacts; every array is copied and made read-only.
 
@@ -57,11 +63,12 @@ class Contacts:
                 where a normal is unknown it is pi, whatever is given.
             approaches: unit directions in which the probe moved when it touched; rows of NaN or
                 zeros, or none at all, where that is unknown.
+            kinds: what was touched, one number or (n,); without it, anything.
 
         Raises:
             ValueError: a shape that does not fit, a value that is not finite, a normal that is
                 not of unit length, a bound that is not positive, a normal bound above pi, normals
-                without a bound or a bound without normals.
+                without a bound or a bound without normals, a kind that there isn't.
         """
         points = _rows("positions", positions)
         count, dimension = len(points), int(points.shape[-1])
@@ -99,6 +106,7 @@ class Contacts:
             _bounds("position_error", position_error, count, np.inf),
             cones,
             _approaches(approaches, points.shape),
+            _kinds(kinds, count),
         )
 
     def _hold(
@@ -108,10 +116,11 @@ class Contacts:
         position_error: NDArray[np.float64],
         normal_error: NDArray[np.float64],
         approaches: NDArray[np.float64],
+        kinds: NDArray[np.int8],
     ) -> None:
         """Take over arrays that are known to be good."""
-        values = (positions, normals, position_error, normal_error, approaches)
-        names = ("positions", "normals", "position_error", "normal_error", "approaches")
+        values = (positions, normals, position_error, normal_error, approaches, kinds)
+        names = ("positions", "normals", "position_error", "normal_error", "approaches", "kinds")
         for name, value in zip(names, values, strict=True):
             value.setflags(write=False)
             object.__setattr__(self, name, value)
@@ -145,6 +154,7 @@ class Contacts:
             self.position_error,
             np.where(vague, half_space, self.normal_error),
             self.approaches,
+            self.kinds,
         )
         return part
 
@@ -161,6 +171,7 @@ class Contacts:
             np.ascontiguousarray(self.position_error[index]),
             np.ascontiguousarray(self.normal_error[index]),
             np.ascontiguousarray(self.approaches[index]),
+            np.ascontiguousarray(self.kinds[index]),
         )
         return part
 
@@ -187,6 +198,7 @@ class Contacts:
             position_error=np.concatenate([part.position_error for part in parts]),
             normal_error=np.concatenate([part.normal_error for part in parts]),
             approaches=np.concatenate([part.approaches for part in parts]),
+            kinds=np.concatenate([part.kinds for part in parts]),
         )
 
 
@@ -220,6 +232,21 @@ def _approaches(values: ArrayLike | None, shape: tuple[int, ...]) -> NDArray[np.
             f"approaches: row {row} has length {lengths[row]:.6g}; directions must be unit vectors"
         )
     return directions / np.where(lengths > 0.0, lengths, 1.0)[:, None]
+
+
+def _kinds(values: ArrayLike | None, count: int) -> NDArray[np.int8]:
+    given = np.asarray(ANYTHING if values is None else values)
+    if given.ndim == 0:
+        given = np.full(count, given)
+    if given.shape != (count,):
+        raise ValueError(f"kinds must be one number or have shape ({count},), not {given.shape}")
+    bad = np.flatnonzero(~np.isin(given, (ANYTHING, FACE, EDGE, VERTEX)))
+    if bad.size:
+        raise ValueError(
+            f"kinds: row {bad[0]} is {given[bad[0]]!r}; it must be {ANYTHING} (anything),"
+            f" {FACE} (face), {EDGE} (edge) or {VERTEX} (vertex)"
+        )
+    return given.astype(np.int8)
 
 
 def _bounds(name: str, values: ArrayLike, count: int, largest: float) -> NDArray[np.float64]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
 from .belief import Belief, Search
-from .contacts import Contacts
+from .contacts import EDGE, Contacts
 from .features import Features
 from .free_space import FreeSpace
 from .hypotheses import Hypothesis, PoseTolerance
@@ -101,6 +101,7 @@ class Recognizer:
             )
         if outlines and features == "all":
             raise ValueError("features 'all' is for solids; outlines have edges alone")
+        self._edges = features == "all"
         self.models = solids
         self.outlines = outlines
         self.dimension = 3 if solids else 2
@@ -108,7 +109,7 @@ class Recognizer:
         self.tolerance = tolerance or PoseTolerance()
         self.limits = limits or SearchLimits()
         self._solids = tuple(
-            SolidEntry.of(model, edges=features == "all", folder=cache) for model in solids
+            SolidEntry.of(model, edges=self._edges, folder=cache) for model in solids
         )
         self._outlines = tuple(PlanarEntry.of(model) for model in outlines)
         self._spans = np.array([model.diameter for model in solids])
@@ -221,6 +222,12 @@ class Recognizer:
             raise ValueError(
                 f"contacts have {contacts.dimension} coordinates, but the library is of"
                 f" {kinds[self.dimension]}: give {self.dimension}"
+            )
+        sharp = np.flatnonzero(contacts.kinds >= EDGE)
+        if sharp.size and not self._edges:
+            raise ValueError(
+                f"contact {sharp[0]} is on an edge or a vertex, but this recogniser knows faces"
+                ' alone: make it with features="all"'
             )
         if outliers < 0:
             raise ValueError(f"outliers is {outliers}; it must be zero or more")

@@ -66,8 +66,7 @@ def search_model(
     middles,
     packed,
     prefixes,
-    first_domain,
-    later_domain,
+    domains,
     spare,
     switches,
     crowd,
@@ -93,8 +92,7 @@ def search_model(
         middles: (f, 3) a point inside each feature's hull.
         packed: see `ranges.pack_tables`.
         prefixes: (m, k) interpretations of the first k contacts to extend; (1, 0) is the root.
-        first_domain: (w,) bit set, the features that the first contact may be on.
-        later_domain: (w,) the same of all others.
+        domains: (n, w) bit sets, the features that each contact may be on.
         spare: how many contacts may be on none (-1).
         switches: bits, which constraints on pairs to apply.
         crowd: completions of a branch from which poses are asked within the tree.
@@ -112,7 +110,7 @@ def search_model(
         the pose is a witness; (n,) branches at each level; counts (see `NODES`).
     """
     points = contacts[0]
-    n, features, words = len(points), packed.shape[2], len(first_domain)
+    n, features, words = len(points), packed.shape[2], domains.shape[1]
     start = prefixes.shape[1]
     readings = np.empty((n, n, 9))
     pair_readings(contacts, errors, readings)
@@ -147,9 +145,7 @@ def search_model(
     in_cell = finest > 0.0
     cells, cell_angles = np.empty((1, 3, 3)), np.zeros(1)
     if in_cell:
-        left[0, :] = later_domain
-        if start == 0:
-            left[0, 0] = first_domain
+        left[0] = domains
         # What is known of the first contacts says where to look.
         left[0, :start] = _NONE
         for m in range(len(prefixes)):
@@ -177,10 +173,8 @@ def search_model(
             view_cell(cells[turn], points, contacts[1], between, facings)
         for m in range(len(prefixes)):
             for j in range(n):
-                left[start, j] = later_domain
+                left[start, j] = domains[j]
                 sizes[start, j] = features
-            if start == 0:
-                left[0, 0] = first_domain
             if in_cell:
                 for j in range(start, n):
                     sizes[start, j] = facing(

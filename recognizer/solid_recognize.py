@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 from time import perf_counter
 from typing import TYPE_CHECKING
@@ -41,11 +42,14 @@ FINENESS = 4.0
 """Angle of the finest cells of rotations, in bounds on positions over the solid's radius, ..."""
 CELL_ANGLES = (0.04, 0.4)
 """... and its least and largest, radians."""
+FEWEST_FOR_CELLS = 3
+"""Contacts from which on cells are worth their time: two leave nearly all rotations possible."""
 MOST_CELLS = 200_000
 """Cells to look at on the way there."""
 
 Floats = NDArray[np.float64]
-Roots = tuple[NDArray[np.uint64], NDArray[np.uint64]]
+Bits = NDArray[np.uint64]
+"""Sets of features: of each, one bit in rows of 64-bit words."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,12 +86,17 @@ class SolidEntry:
         return feature_permutations(self.model, self.features)
 
     @cached_property
-    def roots(self) -> Roots:
-        """Bit sets of all features, and of one of each orbit under the symmetries."""
-        count = len(self.features)
-        return _bits(np.arange(count), count), _bits(
-            np.unique(self.permutations[0].min(axis=0)), count
-        )
+    def orbits(self) -> Bits:
+        """Bit set of one feature of each orbit under the symmetries."""
+        return _bits(np.unique(self.permutations[0].min(axis=0)), len(self.features))
+
+    @cached_property
+    def by_kind(self) -> Bits:
+        """(4, w) the features that a contact of each kind may be on (see `contacts`)."""
+        faces, count = self.model.face_count, len(self.features)
+        ends = (0, faces, faces + self.features.edge_count, count)
+        spans = [(0, count), *pairwise(ends)]
+        return np.array([_bits(np.arange(*span), count) for span in spans])
 
     @cached_property
     def stable_faces(self) -> list[StableFace]:
@@ -151,10 +160,11 @@ def search_solid(
             and missed < EXACT_SYMMETRY * smallest
             and outliers == 0
         )
-        everything, orbits = entry.roots
+        domains = entry.by_kind[contacts.kinds]
+        if symmetric:
+            domains[0] &= entry.orbits
         start = np.zeros((1, 0), np.int32) if prefixes is None else prefixes
-        roots = (orbits if symmetric else everything, everything)
-        poses, nodes, counts = _search(entry, contacts, *settings, start, roots)
+        poses, nodes, counts = _search(entry, contacts, *settings, start, domains)
         if not surroundings.says_nothing(contacts):
             poses = clear(entry.model, entry.features, poses, contacts, surroundings)
         if symmetric:
@@ -184,7 +194,7 @@ def _search(
     limits: SearchLimits,
     outliers: int,
     prefixes: NDArray[np.int32],
-    roots: Roots,
+    domains: Bits,
 ) -> tuple[Poses, NDArray[np.int64], NDArray[np.int64]]:
     test = entry.test
     *found, nodes, counts = search_kernels.search_model(
@@ -195,7 +205,7 @@ def _search(
         test.middles,
         entry.packed,
         prefixes,
-        *roots,
+        domains,
         outliers,
         constraints.bits,
         float(limits.crowd),
@@ -225,7 +235,9 @@ def _search_standing(
     assert support is not None
     standing = entry.standing
     count, size = len(entry.features), len(standing.features)
-    later = _bits(np.arange(count), size)
+    own = entry.by_kind[contacts.kinds]
+    domains = np.zeros((len(contacts) + 1, -(-size // 64)), np.uint64)
+    domains[1:, : own.shape[1]] = own
     parts: list[Poses] = []
     nodes = np.zeros(len(contacts), np.int64)
     counts = np.zeros(search_kernels.COUNTS, np.int64)
@@ -236,18 +248,17 @@ def _search_standing(
         if touch is None:
             # Bounds so wide that the face's plane, as a contact, says nothing: only the pose does.
             if plain is None:
-                roots = (entry.roots[0], entry.roots[0])
                 plain, some_nodes, some_counts = _search(
-                    entry, contacts, constraints, limits, outliers, start, roots
+                    entry, contacts, constraints, limits, outliers, start, own
                 )
                 nodes += some_nodes
                 counts += some_counts
             parts.append(clear(entry.model, entry.features, plain, contacts, surroundings, face))
             continue
         everything = Contacts.join([touch, contacts])
-        roots = (_bits(np.array([count + index]), size), later)
+        domains[0] = _bits(np.array([count + index]), size)
         poses, some_nodes, some_counts = _search(
-            standing, everything, constraints, limits, outliers, start, roots
+            standing, everything, constraints, limits, outliers, start, domains
         )
         poses = poses.take(poses.faces[:, 0] >= 0)
         poses = clear(entry.model, standing.features, poses, everything, surroundings, face)
@@ -273,7 +284,7 @@ def _finest(contacts: Contacts, radius: float) -> float:
 
     In a finer one the contacts turn by no more than they are off anyway.
     """
-    if not _vague(contacts):
+    if len(contacts) < FEWEST_FOR_CELLS or not _vague(contacts):
         return 0.0
     smallest = float(contacts.position_error.min())
     return float(np.clip(FINENESS * smallest / radius, *CELL_ANGLES))
@@ -337,7 +348,7 @@ def span_solid(
     return entry.test.span(faces, contacts, hypothesis.pose, hypothesis.freedoms, step, most)
 
 
-def _bits(members: NDArray[np.integer], count: int) -> NDArray[np.uint64]:
+def _bits(members: NDArray[np.integer], count: int) -> Bits:
     bits = np.zeros(-(-count // 64), np.uint64)
     members = members.astype(np.uint64)
     np.bitwise_or.at(bits, members >> np.uint64(6), np.uint64(1) << (members & np.uint64(63)))

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import planar_kernels, tree_kernels
-from .contacts import Contacts
+from .contacts import EDGE, Contacts
 from .planar_ranges import PlanarTables
 from .ranges import PairTables
 from .triples import grow_by_triples
@@ -173,14 +173,16 @@ def spread_order(contacts: Contacts) -> NDArray[np.intp]:
 
     Different normals early let a partial interpretation fix its pose early: where all contacts so
     far are on one plane, the tree has little to prune with and the model test less. Half a turn
-    between normals counts as much as the largest extent of the contacts along an axis.
+    between normals counts as much as the largest extent of the contacts along an axis. Contacts
+    known to be on edges or vertices, where the normal says little, come last.
 
     Returns:
         (n,) row indices.
     """
     reach = float(np.ptp(contacts.positions, axis=0).max(initial=0.0))
     scaled = contacts.positions / reach if reach > 0.0 else contacts.positions
-    return tree_kernels.farthest_first(np.hstack([scaled, contacts.normals / 2.0]))
+    order = tree_kernels.farthest_first(np.hstack([scaled, contacts.normals / 2.0]))
+    return order[np.argsort(contacts.kinds[order] >= EDGE, kind="stable")]
 
 
 def prune(

@@ -23,7 +23,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from ..assets import STAND_IN_NAMES
 from ..assets.planar import PLANAR_NAMES
-from ..recognizer import Contacts, Polygon, Polyhedron, SearchLimits
+from ..recognizer import FACE, Contacts, Polygon, Polyhedron, SearchLimits
 from . import soundness_around as around
 from .soundness_case import Case, load, recognizer
 from .soundness_touch import (
@@ -181,6 +181,27 @@ def _edges(drawing: Drawing) -> Case:
     return replace(case, told=max(3, drawing.count - UNTOLD))
 
 
+def _known_kinds(drawing: Drawing) -> Case:
+    features = recognizer((drawing.object_name,), "all", drawing.limits).features(
+        drawing.object_name
+    )
+    rng = drawing.rng
+    sharp = int(rng.integers(1, 2 + drawing.count // 2))
+    pose = random_pose(rng)
+    touched = touch_features(drawing.solid, features, pose, drawing.count, sharp, rng)
+    case = drawing.case(touched, features="all")
+    on_edge = touched.features >= features.face_count
+    on_vertex = touched.features >= features.face_count + features.edge_count
+    contacts = Contacts(
+        case.contacts.positions,
+        case.contacts.normals,
+        position_error=case.contacts.position_error,
+        normal_error=case.contacts.normal_error,
+        kinds=FACE + on_edge.astype(int) + on_vertex,
+    )
+    return replace(case, contacts=contacts)
+
+
 def _some_normals(drawing: Drawing) -> Case:
     case = drawing.case(drawing.on_faces())
     rng, count = drawing.rng, drawing.count
@@ -242,7 +263,7 @@ class Kind:
 
 
 KINDS: dict[str, Kind] = {
-    "faces": Kind(0.22, "contacts on faces, nothing else known", _faces),
+    "faces": Kind(0.16, "contacts on faces, nothing else known", _faces),
     "mixed": Kind(0.10, "bounds of its own for each contact", _mixed),
     "planar": Kind(0.18, "outlines of the plane", _planar, objects=PLANAR_NAMES),
     "free": Kind(0.12, "paths of rays and of balls, misses too", _free_space, (5, 20)),
@@ -254,6 +275,9 @@ KINDS: dict[str, Kind] = {
     "edges": Kind(0.04, "some or all contacts on edges and vertices", _edges, (4, 20), budget=50),
     "some-normals": Kind(0.06, "some normals unknown", _some_normals, (7, 20)),
     "no-normals": Kind(0.02, "no normal known", _no_normals, (4, 12), budget=300),
+    "known-kinds": Kind(
+        0.06, "contacts known to be on faces, edges or vertices", _known_kinds, (4, 20), budget=500
+    ),
 }
 """Every kind; the shares add up to one."""
 
