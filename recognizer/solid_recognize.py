@@ -41,7 +41,9 @@ of the search: what it misses is then below what a witness may miss a bound by."
 FINENESS = 4.0
 """Angle of the finest cells of rotations, in bounds on positions over the solid's radius, ..."""
 CELL_ANGLES = (0.04, 0.4)
-"""... and its least and largest, radians."""
+"""... and its least and largest, radians, ..."""
+LEANING_CELL = 0.1
+"""... and its least where some normals are known: they hold the lean, and cells are for the turn."""
 FEWEST_FOR_CELLS = 3
 """Contacts from which on cells are worth their time: two leave nearly all rotations possible."""
 MOST_CELLS = 200_000
@@ -287,7 +289,10 @@ def _finest(contacts: Contacts, radius: float) -> float:
     if len(contacts) < FEWEST_FOR_CELLS or not _vague(contacts):
         return 0.0
     smallest = float(contacts.position_error.min())
-    return float(np.clip(FINENESS * smallest / radius, *CELL_ANGLES))
+    least, largest = CELL_ANGLES
+    if (contacts.normal_error < np.pi / 2.0).any():
+        least = LEANING_CELL
+    return float(np.clip(FINENESS * smallest / radius, least, largest))
 
 
 def _spread_over_symmetries(
