@@ -43,7 +43,7 @@ FINENESS = 4.0
 CELL_ANGLES = (0.04, 0.4)
 """... and its least and largest, radians, ..."""
 LEANING_CELL = 0.1
-"""... and its least where some normals are known: they hold the lean, and cells are for the turn."""
+"""... and its least where some normals are known, which hold the lean: cells are for the turn."""
 FEWEST_FOR_CELLS = 3
 """Contacts from which on cells are worth their time: two leave nearly all rotations possible."""
 MOST_CELLS = 200_000
