@@ -381,7 +381,7 @@ def locate(count, faces, targets, model, contacts, rotation, ball, angle, work):
     x, u, levers, _ = work[3]
     pivot = work[5][2]
     set_levers(count, faces, x, pivot, levers)
-    return bound_region(
+    bound, about = bound_region(
         count,
         faces,
         targets,
@@ -397,6 +397,27 @@ def locate(count, faces, targets, model, contacts, rotation, ball, angle, work):
         angle,
         work[1],
     )
+    if bound >= 0.0 and _out_of_cone(count, faces, contacts, work[0], bound):
+        return -1.0, 0.0
+    return bound, about
+
+
+@borrowing
+def _out_of_cone(count, faces, contacts, readings, angle):
+    """Whether some normal misses its cone by more than a turn by an angle can make good."""
+    chords, sines = contacts[3], contacts[4]
+    kinds, misses = readings[4], readings[5]
+    # No turn moves a unit vector farther than its chord, 2 sin(angle / 2), or its angle.
+    chord = 2.0 * np.sin(0.5 * min(angle, np.pi)) + ROUNDING
+    for i in range(count):
+        if faces[i] < 0 or kinds[i] == NO_CONE:
+            continue
+        if kinds[i] == ARC:
+            if sines[i] < 1.0 and misses[i] > sines[i] + angle + ROUNDING:
+                return True
+        elif misses[i] > chords[i] + chord:
+            return True
+    return False
 
 
 @borrowing
