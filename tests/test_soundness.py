@@ -93,6 +93,7 @@ PLAYED = {
     "edges": 4,
     "some-normals": 10,
     "no-normals": 4,
+    "known-kinds": 25,
 }
 """Cases of each kind, of which there are two parts: seconds each."""
 
