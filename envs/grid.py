@@ -10,8 +10,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from ..recognizer import Contacts, Polyhedron
 from ..recognizer.rays import cast_rays
-from .noise import uniform_in_ball, uniform_in_cone
-from .sensor import SensorNoise
+from .noise import SensorNoise
 
 Floats = NDArray[np.float64]
 
@@ -37,10 +36,13 @@ class TrueContacts:
         return len(self.points_world)
 
     def noisy(self, noise: SensorNoise, rng: np.random.Generator) -> Contacts:
-        """What a sensor reports, with noise uniform inside its bounds."""
+        """What a sensor reports, with noise inside its bounds."""
+        points, normals = noise.blur(
+            rng, np.ones(len(self), np.int8), self.points_world, self.normals_world
+        )
         return Contacts(
-            self.points_world + uniform_in_ball(rng, len(self), noise.position_error),
-            uniform_in_cone(rng, self.normals_world, noise.normal_error),
+            points,
+            normals,
             position_error=noise.position_error,
             normal_error=noise.normal_error,
         )
@@ -82,14 +84,34 @@ def _grids(corners: Floats, spacing: float, rng: np.random.Generator) -> tuple[F
     low, high = corners.min(axis=0), corners.max(axis=0)
     starts, directions = [], []
     for along in range(3):
-        first, second = (axis for axis in range(3) if axis != along)
-        u, v = np.meshgrid(
-            np.arange(low[first] + spacing * rng.random(), high[first], spacing),
-            np.arange(low[second] + spacing * rng.random(), high[second], spacing),
+        first, second = (
+            np.arange(low[axis] + spacing * rng.random(), high[axis], spacing)
+            for axis in range(3)
+            if axis != along
         )
-        grid = np.empty((u.size, 3))
-        grid[:, first], grid[:, second] = u.ravel(), v.ravel()
-        grid[:, along] = high[along] + 0.1 * spacing
-        starts.append(grid)
-        directions.append(np.tile(-np.eye(3)[along], (u.size, 1)))
+        grid = rays_along(along, first, second, high[along] + 0.1 * spacing)
+        starts.append(grid[0])
+        directions.append(grid[1])
     return np.concatenate(starts), np.concatenate(directions)
+
+
+def rays_along(axis: int, first: Floats, second: Floats, height: float) -> tuple[Floats, Floats]:
+    """A grid of rays against one axis of a frame.
+
+    Args:
+        axis: 0, 1 or 2; the rays run from the side where it is positive.
+        first: (m,) coordinates of the grid along the first of the other two axes, metres.
+        second: (n,) along the second.
+        height: where on the axis the rays start, metres.
+
+    Returns:
+        (m n, 3) starts, metres, and (m n, 3) unit directions, in that frame.
+    """
+    u, v = np.meshgrid(first, second)
+    starts = np.insert(np.column_stack([u.ravel(), v.ravel()]), axis, height, axis=1)
+    return starts, np.tile(-np.eye(3)[axis], (u.size, 1))
+
+
+def centred_ticks(count: int, spacing: float) -> Floats:
+    """(count,) coordinates a spacing apart, metres, with zero in their middle."""
+    return spacing * (np.arange(count, dtype=np.float64) - (count - 1) / 2.0)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from gymnasium import spaces
 
 from ..recognizer import Belief, Contacts
-from .sensor import Touch
+from .touch import Touch
 
 Observation = dict[str, Any]
 """Arrays by name, as `ObservationLayout.space` has them."""
@@ -20,7 +21,7 @@ class ObservationLayout:
     """Sizes and limits of the observation arrays."""
 
     rays: int
-    """Rays in an episode: three a probe."""
+    """The most rays in an episode."""
     hypotheses: int
     """Hypotheses shown, heaviest first."""
     objects: int
@@ -60,6 +61,12 @@ class ObservationLayout:
             }
         )
 
+    @cached_property
+    def _kinds(self) -> dict[str, tuple[tuple[int, ...], np.dtype[Any]]]:
+        """Shape and type of each array; the space itself takes longer to build than a touch."""
+        spaces = self.space().items()
+        return {key: (space.shape or (1,), np.dtype(space.dtype)) for key, space in spaces}
+
     def pack(
         self,
         contacts: Contacts,
@@ -71,21 +78,21 @@ class ObservationLayout:
 
         Unused rows are zero, and ``hypothesis_objects`` is -1 there.
         """
-        values = {
-            key: np.zeros(space.shape or (1,), space.dtype) for key, space in self.space().items()
-        }
+        values: Observation = {key: np.zeros(*kind) for key, kind in self._kinds.items()}
         count = len(contacts)
         values["contact_count"][0] = count
         values["contact_positions"][:count] = contacts.positions
         values["contact_normals"][:count] = np.clip(contacts.normals, -1.0, 1.0)
         values["contact_position_error"][:count] = contacts.position_error
         values["contact_normal_error"][:count] = contacts.normal_error
-        for index, touch in enumerate(touches):
-            rows = slice(3 * index, 3 * index + 3)
+        sent = 0
+        for touch in touches:
+            rows = slice(sent, sent + len(touch.outcomes))
             values["ray_starts"][rows] = touch.starts_world
             values["ray_ends"][rows] = touch.ends_world
             values["ray_outcomes"][rows] = touch.outcomes
-        values["ray_count"][0] = 3 * len(touches)
+            sent = rows.stop
+        values["ray_count"][0] = sent
         values["hypothesis_objects"][:] = -1
         hypotheses = belief.hypotheses if belief else ()
         values["hypothesis_count"][0] = len(hypotheses)

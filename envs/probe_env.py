@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 import gymnasium
 import numpy as np
@@ -13,16 +13,19 @@ from scipy.spatial.transform import RigidTransform
 from ..recognizer import (
     Belief,
     Contacts,
+    FreeSpace,
     Polyhedron,
     PoseTolerance,
     Recognizer,
     SearchLimits,
 )
 from .library import LibrarySource, load_library
+from .noise import Distribution, SensorNoise
 from .observation import Observation, ObservationLayout
-from .placement import AcrossPlane
+from .placement import AcrossPlane, Placement, Resting
 from .scene import ProbeScene
-from .sensor import RaySensor, SensorNoise, Touch
+from .sensors import make_sensor
+from .touch import ProbeCommand, Sensor, Touch
 
 INCH = 0.0254
 HALF_WIDTH = 0.375
@@ -41,6 +44,10 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
     outward normal there, or that it reached the plane. After each probe the recogniser says which
     hypotheses (object and pose) the contacts so far allow.
 
+    What goes along the rays is the sensor: points ("ray", the memo's ideal probe), balls that stop
+    where they first touch ("ball"), or a finger with a ball tip, driven by dynamics ("finger").
+    Balls and fingers touch edges and vertices too.
+
     ## Action Space
     `Box(-1, 1, (3,))`, float32:
 
@@ -54,7 +61,8 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
     (`env.half_width`); rays come in at a slant, so they also reach what lies somewhat outside.
 
     ## Observation Space
-    A `Dict` of `Box`es. R is 3 `max_probes`, H is `hypotheses_shown`; unused rows are zero.
+    A `Dict` of `Box`es. R is `max_probes` times the sensor's rays (three, for all that have a
+    name), H is `hypotheses_shown`; unused rows are zero.
 
     | key | shape | meaning |
     |---|---|---|
@@ -64,7 +72,7 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
     | contact_position_error | (R,) | bounds on them, metres |
     | contact_normal_error | (R,) | bounds on them, radians |
     | ray_count | (1,) | rays sent so far |
-    | ray_starts, ray_ends | (R, 3) | segments swept, metres |
+    | ray_starts, ray_ends | (R, 3) | segments swept, of a ball by its centre, metres |
     | ray_outcomes | (R,) | 1 object, 2 plane, 3 nothing; 0 not sent |
     | hypothesis_count | (1,) | hypotheses left; 0 before the first contact too |
     | hypothesis_objects | (H,) | index into the library, heaviest first; -1 none |
@@ -78,8 +86,14 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
     -1 a probe.
 
     ## Starting State
-    The object is drawn from the library; its orientation is uniform, 10 to 50 % of its height are
-    below the plane, and its centroid lies within a fifth of the half width of the origin.
+    The object is drawn from the library; its centroid lies within a fifth of the half width of the
+    origin. By `placement`:
+
+    - "across": held at any orientation, uniform, with 10 to 50 % of its height below the plane;
+    - "resting": standing on the plane, on a face drawn by how often a slow tumble ends on it;
+    - "dropped": as it comes to rest in a simulated drop.
+
+    In the last two the recogniser knows that the object stands on the plane.
 
     ## Episode End
     Terminated when one hypothesis is left, up to the object's symmetry and with its pose fixed, or
@@ -93,8 +107,13 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
     |---|---|---|
     | library | None | names of stand-ins, models, or a folder of meshes; None: all stand-ins |
     | object_name | None | always this object; None: drawn at reset |
+    | placement | across | "across", "resting" or "dropped" |
+    | sensor | ray | "ray", "ball", "finger", "range", "range-grid", or a ready `Sensor` |
     | position_error | 0.000254 | bound on positions, metres (0.01 in) |
     | normal_error | pi / 10 | bound on normals, radians |
+    | distribution | uniform | of the noise inside its bounds: "uniform" or "gaussian" |
+    | radius | None | of a ball or a finger's tip, metres; None: 0.002 |
+    | use_free_space | False | whether the recogniser is told of the paths that were free |
     | max_probes | 40 | probes before truncation |
     | hypotheses_shown | 16 | hypotheses in the observation |
     | tolerance | None | which poses count as the same |
@@ -114,8 +133,13 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
         library: LibrarySource = None,
         *,
         object_name: str | None = None,
+        placement: Literal["across", "resting", "dropped"] = "across",
+        sensor: str | Sensor = "ray",
         position_error: float = 0.01 * INCH,
         normal_error: float = np.pi / 10.0,
+        distribution: Distribution = "uniform",
+        radius: float | None = None,
+        use_free_space: bool = False,
         max_probes: int = 40,
         hypotheses_shown: int = 16,
         tolerance: PoseTolerance | None = None,
@@ -124,31 +148,46 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
         """See the class for the arguments.
 
         Raises:
-            ValueError: an unknown object, a library that can't be loaded, a bound that isn't
-                positive, or fewer than one probe or hypothesis.
+            ValueError: an unknown object, placement or sensor, a library that can't be loaded, a
+                bound that isn't positive, a radius that the sensor or the objects don't allow, or
+                fewer than one probe or hypothesis.
         """
         for name, value in (("max_probes", max_probes), ("hypotheses_shown", hypotheses_shown)):
             if value < 1:
                 raise ValueError(f"{name} is {value}; it must be at least 1")
-        noise = SensorNoise(position_error=position_error, normal_error=normal_error)
+        noise = SensorNoise(
+            position_error=position_error, normal_error=normal_error, distribution=distribution
+        )
         self.library = load_library(library)
         self._index = {model.name: row for row, model in enumerate(self.library)}
         if object_name is not None and object_name not in self._index:
             known = ", ".join(self._index)
             raise ValueError(f"no object is called {object_name!r}; the library has: {known}")
         self._object_name = object_name
-        self.recognizer = Recognizer(self.library, tolerance=tolerance, limits=limits)
         largest = max(model.diameter for model in self.library)
         self.half_width = HALF_WIDTH * largest
-        self._placement = AcrossPlane(offset=0.2 * self.half_width)
-        self._sensor = RaySensor(noise, REACH * largest)
+        self._placement = _placement(placement, 0.2 * self.half_width)
+        # One plane for all: its error is that of the largest object.
+        self._support = max(
+            (self._placement.support(model) for model in self.library),
+            key=lambda plane: plane.error if plane else 0.0,
+        )
+        if isinstance(sensor, str):
+            sensor = make_sensor(sensor, noise, REACH * largest, radius=radius)
+        elif radius is not None:
+            raise ValueError(f"radius is {radius:g}, but a ready sensor has its own")
+        self.sensor = sensor
+        self.recognizer = Recognizer(
+            self.library, features=sensor.features, tolerance=tolerance, limits=limits
+        )
+        self._use_free_space = use_free_space
         self._scenes: dict[str, ProbeScene] = {}
         self._max_probes = max_probes
         self._layout = ObservationLayout(
-            rays=3 * max_probes,
+            rays=sensor.rays * max_probes,
             hypotheses=hypotheses_shown,
             objects=len(self.library),
-            extent=2.0 * REACH * largest + position_error,
+            extent=2.0 * REACH * largest + sensor.noise.position_error,
         )
         self.observation_space = self._layout.space()
         self.action_space = spaces.Box(-1.0, 1.0, (3,), np.float32)
@@ -203,11 +242,15 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
         if wanted.shape != (3,) or not np.isfinite(wanted).all():
             raise ValueError(f"an action is three finite numbers, not {action!r}")
         x, y, yaw = np.clip(wanted, -1.0, 1.0) * (self.half_width, self.half_width, np.pi / 3.0)
-        touch = self._sensor.touch(scene, x, y, yaw, self.np_random)
+        command = ProbeCommand(float(x), float(y), float(yaw))
+        touch = self.sensor.touch(scene, command, self.np_random)
         self._touches.append(touch)
         if len(touch.contacts):
             self._contacts = Contacts.join([self._contacts, touch.contacts])
-            self._belief = self.recognizer.recognize(self._contacts)
+        if len(self._contacts) and (len(touch.contacts) or self._use_free_space):
+            self._belief = self.recognizer.recognize(
+                self._contacts, free_space=self._known_free(), support=self._support
+            )
         ended = self._belief is not None and (self._belief.unique or self._belief.empty)
         truncated = len(self._touches) >= self._max_probes
         return self._observe(), -1.0, ended, truncated, self._info()
@@ -227,12 +270,27 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
             raise gymnasium.error.ResetNeeded("call reset first")
         return self._scene
 
+    def _known_free(self) -> FreeSpace | None:
+        if not self._use_free_space:
+            return None
+        return FreeSpace.join([touch.free_space for touch in self._touches])
+
     def _observe(self) -> Observation:
         # Past max_probes an episode may be stepped on; the observation keeps its last rows.
         touches = self._touches[-self._max_probes :]
-        contacts = self._contacts[slice(-3 * self._max_probes, None)]
+        contacts = self._contacts[slice(-self.sensor.rays * self._max_probes, None)]
         return self._layout.pack(contacts, touches, self._belief, self._index)
 
     def _info(self) -> dict[str, Any]:
         pose = self.T_world_object.as_matrix()
         return {"truth": {"object": self.true_object.name, "pose": pose}}
+
+
+def _placement(name: str, offset: float) -> Placement:
+    if name == "across":
+        return AcrossPlane(offset=offset)
+    if name == "resting":
+        return Resting(offset=offset)
+    if name == "dropped":
+        return Resting(offset=offset, mode="dropped")
+    raise ValueError(f"placement is {name!r}; it must be 'across', 'resting' or 'dropped'")

@@ -1,19 +1,29 @@
 """The MuJoCo scene: a support plane and one object held across it (memo, Section 4.4).
 
 The object is held at any orientation with the plane ``z = 0`` cutting through it; what lies below
-the plane can't be touched.
+the plane can't be touched. Rays meet the true mesh, concave as it may be. MuJoCo collides a mesh as
+its convex hull, so balls and fingers meet the convex parts that the object is the union of; these
+are compiled in when first asked for.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import RigidTransform
+from scipy.spatial.transform import RigidTransform, Rotation
 
+from ..assets import ConvexPart
 from ..recognizer import Polyhedron
+from ..recognizer.rays import cast_rays
+from .collision import CollisionParts, collision_parts
+from .feature_kind import FeatureKinds
+from .finger import Finger, FingerDesign, add_finger
 
 Floats = NDArray[np.float64]
 
@@ -23,6 +33,21 @@ OBJECT, PLANE, NOTHING = 1, 2, 3
 LARGEST_DIAMETER = 10.0
 SMALLEST_DIAMETER = 1e-3
 """Diameters (metres) at which MuJoCo's single-precision meshes are still exact enough."""
+
+MESH_ROUNDING = 4e-7
+"""Share of the object's diameter that MuJoCo's single-precision meshes may be off by. Coordinates
+from the centroid are below the diameter, so each is off by 6e-8 of it at most; MuJoCo moves and
+turns the mesh and rounds it once more: root three times twice that is 2.1e-7."""
+NORMAL_ROUNDING = 1e-5
+"""The same for normals, radians. Triangles so narrow that they lean by more are not relied on."""
+
+RAYS_MEET = np.array([1, 0, 0, 0, 0, 0], np.uint8)
+"""Which of MuJoCo's groups rays see: the true mesh and the plane; not the parts, not the finger."""
+PARTS_GROUP, POINT_GROUP = 3, 5
+PARKED = 5.0
+"""How high over the plane a finger waits, in diameters of the object."""
+POINT = 1e-9
+"""Radius of what distances are measured from, metres; MuJoCo has no points."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,8 +65,13 @@ class RayReadings:
 class ProbeScene:
     """One object and the support plane, in MuJoCo."""
 
-    def __init__(self, model: Polyhedron) -> None:
+    def __init__(self, model: Polyhedron, collision: CollisionParts | None = None) -> None:
         """Compile the scene of an object.
+
+        Args:
+            model: the object.
+            collision: its convex parts; by default `collision_parts` finds them when they are
+                needed.
 
         Raises:
             ValueError: the object is too large or too small to be simulated faithfully.
@@ -52,27 +82,49 @@ class ProbeScene:
                 f" from {SMALLEST_DIAMETER:g} to {LARGEST_DIAMETER:g} m. Are the units metres?"
             )
         self.model = model
-        spec = mujoco.MjSpec()
-        mesh = spec.add_mesh(name="object")
-        mesh.uservert = model.vertices.astype(np.float32).ravel()
-        mesh.userface = model.triangles.astype(np.int32).ravel()
-        body = spec.worldbody.add_body(name="object")
-        body.add_geom(name="object", type=mujoco.mjtGeom.mjGEOM_MESH, meshname="object")
-        spec.worldbody.add_geom(
-            name="plane", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0.0, 0.0, 1.0]
-        )
-        self._model = spec.compile()
-        self._data = mujoco.MjData(self._model)
-        self._object = self._model.geom("object").id
-        self._body = self._model.body("object").id
+        self.position_rounding = MESH_ROUNDING * model.diameter
+        """How far off single precision puts the object's surface, metres."""
         self.T_world_object = RigidTransform.identity()
+        self._collision = collision
+        self._compile((), None)
+
+    @cached_property
+    def collision(self) -> CollisionParts:
+        """The convex parts that balls and fingers meet.
+
+        Raises:
+            ValueError: the object has no exact ones.
+        """
+        return self._collision or collision_parts(self.model)
+
+    @cached_property
+    def kinds(self) -> FeatureKinds:
+        """Tells what of the object a contact lies on; for scoring alone."""
+        off = self.position_rounding + self.collision.stray
+        return FeatureKinds(self.model, 2.0 * off + 1e-7)
+
+    @property
+    def finger(self) -> FingerDesign | None:
+        """The finger in the scene, if any."""
+        return self._finger
+
+    def solidify(self) -> None:
+        """Have collision geometry in the scene; compiles it anew where there is none yet."""
+        if not self.part_geoms:
+            self._compile(self.collision.parts, None)
+
+    def mount(self, finger: FingerDesign) -> None:
+        """Have a finger in the scene, and something to collide with; compiles anew for another."""
+        if self._finger != finger:
+            self._compile(self.collision.parts, finger)
 
     def place(self, T_world_object: RigidTransform) -> None:
         """Hold the object at a pose, model to world."""
         self.T_world_object = T_world_object
-        self._model.body_pos[self._body] = T_world_object.translation
-        self._model.body_quat[self._body] = T_world_object.rotation.as_quat(scalar_first=True)
-        mujoco.mj_forward(self._model, self._data)
+        # The mesh is given from its centroid: far from the origin, single precision is coarse.
+        self.mj_model.body_pos[self._body] = T_world_object.apply(self.model.centroid)
+        self.mj_model.body_quat[self._body] = T_world_object.rotation.as_quat(scalar_first=True)
+        mujoco.mj_forward(self.mj_model, self.mj_data)
 
     def cast(self, starts_world: Floats, directions_world: Floats) -> RayReadings:
         """Trace rays until they meet the object or the plane.
@@ -81,26 +133,157 @@ class ProbeScene:
             starts_world: (r, 3) metres.
             directions_world: (r, 3) unit vectors.
         """
+        model, data, geom, seen = self.mj_model, self.mj_data, self._met, self._seen
         count = len(starts_world)
-        outcomes = np.full(count, NOTHING, np.int8)
-        ends = np.array(starts_world)
-        normals = np.zeros((count, 3))
-        geom = np.empty(1, np.int32)
-        normal = np.empty(3)
+        depths, normals = np.empty((count, 1)), np.empty((count, 3))
+        outcomes = np.empty(count, np.int8)
         for ray in range(count):
-            depth = mujoco.mj_ray(
-                self._model,
-                self._data,
-                starts_world[ray],
-                directions_world[ray],
-                None,
-                True,
-                -1,
-                geom,
-                normal,
-            )
-            if geom[0] >= 0:
-                outcomes[ray] = OBJECT if geom[0] == self._object else PLANE
-                ends[ray] = starts_world[ray] + depth * directions_world[ray]
-                normals[ray] = normal
+            start, direction, normal = starts_world[ray], directions_world[ray], normals[ray]
+            depth = mujoco.mj_ray(model, data, start, direction, seen, True, -1, geom, normal)
+            outcome = self._outcomes[geom.item()]
+            if outcome == NOTHING:
+                depth = normal[:] = 0.0
+            depths[ray, 0], outcomes[ray] = depth, outcome
+        ends = depths * directions_world
+        ends += starts_world
+        if self._bent and (outcomes == OBJECT).any():
+            self._unbend(starts_world, directions_world, outcomes, normals)
         return RayReadings(outcomes, ends, normals)
+
+    def _unbend(
+        self, starts: Floats, directions: Floats, outcomes: NDArray[np.int8], normals: Floats
+    ) -> None:
+        """Put the model's own normals where a narrow triangle may have been met."""
+        hits = cast_rays(self.model, self.T_world_object, starts, directions)
+        known = (outcomes == OBJECT) & hits.hit
+        normals[known] = hits.normals_world[known]
+
+    def _compile(self, parts: Sequence[ConvexPart], finger: FingerDesign | None) -> None:
+        spec = mujoco.MjSpec()
+        body = spec.worldbody.add_body(name="object")
+        centroid = self.model.centroid
+        vertices = self.model.vertices - centroid
+        _add_mesh(spec, body, "object", vertices, self.model.triangles, collides=False)
+        spec.worldbody.add_geom(
+            name="plane", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0.0, 0.0, 1.0]
+        )
+        for index, part in enumerate(parts):
+            name, corners = f"part {index}", part.vertices - centroid
+            _add_mesh(spec, body, name, corners, part.triangles, collides=True)
+        if parts:
+            # Distances are measured from here; what is in the way doesn't feel it.
+            spec.worldbody.add_geom(
+                name="point", size=[POINT, 0, 0], contype=0, conaffinity=0, group=POINT_GROUP
+            )
+        if finger is not None:
+            add_finger(spec, finger)
+        self.mj_model = spec.compile()
+        self.mj_data = mujoco.MjData(self.mj_model)
+        self._finger = finger
+        if finger is not None:
+            above = np.array([0.0, 0.0, PARKED * self.model.diameter])
+            Finger(self.mj_model, self.mj_data).put(above, np.zeros(3))
+        self._note(parts)
+        self.place(self.T_world_object)
+
+    def _note(self, parts: Sequence[ConvexPart]) -> None:
+        """Take down where things are in the compiled model, and how far off it is."""
+        mj_model = self.mj_model
+        self._body = mj_model.body("object").id
+        self._met = np.empty(1, np.int32)
+        self._outcomes = {-1: NOTHING, mj_model.geom("object").id: OBJECT}
+        self._outcomes[mj_model.geom("plane").id] = PLANE
+        self._seen = RAYS_MEET if parts else None  # without parts there is nothing else to see
+        self._bent = _mesh_leaning(mj_model, self.model) > NORMAL_ROUNDING
+        self.point_geom = mj_model.geom("point").id if parts else -1
+        self.part_geoms = [mj_model.geom(f"part {index}").id for index in range(len(parts))]
+        self.part_reaches = np.array([_reach(mj_model, geom) for geom in self.part_geoms])
+        pairs = zip(self.part_geoms, parts, strict=True)
+        self.part_leaning = max((_part_leaning(mj_model, *pair) for pair in pairs), default=0.0)
+        if parts:
+            # Where two planes stray no farther than so much from each other over a face, they lean
+            # by no more than twice that over its width.
+            self.part_leaning += 2.0 * self.collision.stray / _narrowest_face(self.model)
+
+
+def _add_mesh(
+    spec: mujoco.MjSpec,
+    body: Any,
+    name: str,
+    vertices: Floats,
+    triangles: NDArray[np.int64],
+    *,
+    collides: bool,
+) -> None:
+    """Add a mesh to a body: as its convex hull to collide with, or as it is for rays alone."""
+    mesh = spec.add_mesh(name=name)
+    mesh.uservert = vertices.astype(np.float32).ravel()
+    mesh.userface = triangles.astype(np.int32).ravel()
+    body.add_geom(
+        name=name,
+        type=mujoco.mjtGeom.mjGEOM_MESH,
+        meshname=name,
+        contype=int(collides),
+        conaffinity=int(collides),
+        group=PARTS_GROUP if collides else 0,
+    )
+
+
+def _unit_crosses(corners: Floats) -> Floats:
+    """(t, 3) unit normals of triangles (t, 3, 3); zero for one without an area."""
+    crosses = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    sizes = np.linalg.norm(crosses, axis=1, keepdims=True)
+    return crosses / np.where(sizes > 0.0, sizes, 1.0)
+
+
+def _mesh_leaning(mj_model: mujoco.MjModel, model: Polyhedron) -> float:
+    """How far the normals that rays meet are off the faces' own, radians.
+
+    Pi where the compiled triangles are not the model's any more.
+    """
+    geom = mj_model.geom("object").id
+    mesh = mj_model.geom_dataid[geom]
+    first, count = mj_model.mesh_faceadr[mesh], mj_model.mesh_facenum[mesh]
+    triangles = mj_model.mesh_face[first : first + count]
+    if not np.array_equal(triangles, model.triangles):
+        return np.pi
+    first, count = mj_model.mesh_vertadr[mesh], mj_model.mesh_vertnum[mesh]
+    vertices = mj_model.mesh_vert[first : first + count].astype(np.float64)
+    turn = Rotation.from_quat(mj_model.geom_quat[geom], scalar_first=True)
+    normals = turn.apply(_unit_crosses(vertices[triangles]))
+    off = np.linalg.norm(normals - model.normals[model.triangle_faces], axis=1)
+    return float(2.0 * np.arcsin(np.minimum(off / 2.0, 1.0)).max())
+
+
+def _reach(mj_model: mujoco.MjModel, geom: int) -> float:
+    """The radius of a ball around a mesh geom's own origin that holds it, metres."""
+    mesh = mj_model.geom_dataid[geom]
+    first, count = mj_model.mesh_vertadr[mesh], mj_model.mesh_vertnum[mesh]
+    lengths = np.linalg.norm(mj_model.mesh_vert[first : first + count].astype(np.float64), axis=1)
+    return float(lengths.max()) * (1.0 + 1e-9)
+
+
+def _narrowest_face(model: Polyhedron) -> float:
+    """The least width of a face, metres; of each face that of its widest triangle counts."""
+    corners = model.vertices[model.triangles]
+    sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+    widths = np.zeros(model.face_count)
+    np.maximum.at(widths, model.triangle_faces, 2.0 * _areas(corners) / sides.max(axis=1))
+    return float(widths.min())
+
+
+def _areas(corners: Floats) -> Floats:
+    """(t,) areas of triangles (t, 3, 3), square metres."""
+    crosses = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    return 0.5 * np.linalg.norm(crosses, axis=1)
+
+
+def _part_leaning(mj_model: mujoco.MjModel, geom: int, part: ConvexPart) -> float:
+    """How far the faces of a compiled convex part are off its own, radians."""
+    mesh = mj_model.geom_dataid[geom]
+    first, count = mj_model.mesh_polyadr[mesh], mj_model.mesh_polynum[mesh]
+    turn = Rotation.from_quat(mj_model.geom_quat[geom], scalar_first=True)
+    compiled = turn.apply(mj_model.mesh_polynormal[first : first + count])
+    own = _unit_crosses(part.vertices[part.triangles])
+    off = np.linalg.norm(compiled[:, None] - own[None], axis=2).min(axis=1)
+    return float(2.0 * np.arcsin(np.minimum(off / 2.0, 1.0)).max())

@@ -16,8 +16,8 @@ from rich.console import Console
 from rich.progress import Progress
 
 from ..envs.grid import TrueContacts, sense_grid
+from ..envs.noise import SensorNoise
 from ..envs.probe_env import INCH
-from ..envs.sensor import SensorNoise
 from ..recognizer import Belief, Contacts, Polyhedron
 
 P = ParamSpec("P")

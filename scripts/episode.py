@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from scipy.spatial.transform import RigidTransform
 
     from ..envs.probe_env import ProbeEnv
-    from ..envs.sensor import Touch
+    from ..envs.touch import Touch
     from ..recognizer import Belief, Hypothesis
 
 __all__ = ["episode"]

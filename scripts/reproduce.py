@@ -40,8 +40,8 @@ def _table2(trials: int, seed: int) -> None:
     from ..assets.memo import table2
     from ..envs.grid import sense_grid
     from ..envs.library import load_library
+    from ..envs.noise import SensorNoise
     from ..envs.probe_env import INCH
-    from ..envs.sensor import SensorNoise
     from ..recognizer import PairTables
     from ..recognizer.tree import prune
 

@@ -9,8 +9,8 @@ from time import perf_counter
 import numpy as np
 from oracles import model, tables
 
+from palpate.envs.noise import SensorNoise
 from palpate.envs.probe_env import INCH
-from palpate.envs.sensor import SensorNoise
 from palpate.recognizer import Belief, Recognizer, pose_difference
 from palpate.recognizer.tree import prune
 from palpate.scripts import (

@@ -1,0 +1,208 @@
+"""Measure the sensors: `python -m palpate.scripts.bench_touch`.
+
+Balls and fingers on their way to every face, convex edge and vertex of the stand-ins, against plain
+geometry that knows no simulator; and how long a triad takes, each figure beside its goal.
+"""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from .bench import QUICK, keep_to_one_thread
+
+if TYPE_CHECKING:
+    from ..envs.ball_sensor import BallSensor
+    from ..envs.finger_sensor import FingerSensor
+    from ..recognizer import Polyhedron
+    from .bench_report import Row, Section
+
+RADIUS = 0.002
+POSITION_GOAL = {"ball": 1e-5, "finger": 5e-5}
+"""Largest distance from where plain geometry puts a contact, metres."""
+NORMAL_GOAL = 0.1
+"""Largest angle of a normal on a face, degrees."""
+KIND_GOAL = 0.999
+"""Share of contacts whose feature is told right."""
+TRIAD_GOAL = {"ray": 2e-5, "ball": 1e-3, "finger": 0.1}
+"""Median time of a triad, seconds."""
+NOTCH = 5e-4
+"""A contact so deep inside the convex hull is in a notch, metres."""
+TRIADS = 1000
+PLACES = 20
+"""Triads a scene, and how often the object is placed anew among them."""
+
+
+class Part(StrEnum):
+    """What can be measured on its own."""
+
+    BALL = "ball"
+    FINGER = "finger"
+    SPEED = "speed"
+
+
+def bench_touch(
+    approaches: Annotated[
+        int, typer.Option(metavar="N", min=1, help="Random approaches a kind of feature.")
+    ] = 1000,
+    seed: Annotated[int, typer.Option(metavar="N", min=0, help="Seed of the approaches.")] = 0,
+    only: Annotated[
+        list[Part] | None,
+        typer.Option(metavar="PART", help=f"Only this part; one or more of: {', '.join(Part)}."),
+    ] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="A tenth of the approaches.")] = False,
+) -> None:
+    """Measure how exactly balls and fingers touch, and how long a triad takes.
+
+    ball, finger: approaches to each kind of feature of each stand-in, every feature in its turn,
+    against plain geometry. speed: median time of a triad at random places around each stand-in.
+    """
+    keep_to_one_thread()
+    # Only now: what these import reads the number of threads once.
+    from .bench_report import show
+
+    count = max(approaches // (QUICK if quick else 1), 1)
+    print(f"{count} approaches a kind of feature, seed {seed}, one thread")
+    for part in only or list(Part):
+        show(measure_speed(seed) if part == Part.SPEED else measure_touch(part, count, seed))
+
+
+def measure_touch(name: str, approaches: int, seed: int) -> Section:
+    """How far a sensor's contacts are from where plain geometry has them."""
+    from ..envs.library import load_library
+    from .bench_report import Section
+    from .touch_cases import KINDS
+
+    rows = [
+        _touch_row(name, model, kind, approaches, seed)
+        for model in load_library()
+        for kind in KINDS
+    ]
+    return Section(
+        f"{name}, tip of {1e3 * RADIUS:g} mm: largest error of position, before noise",
+        rows,
+        "Place and normal are even over a feature, orientations over all that face the ball within"
+        " 84 degrees. Goals are for the largest error of all approaches; on edges and vertices the"
+        " normal has none. A contact is in a notch if it is half a millimetre or more inside the"
+        " convex hull.",
+    )
+
+
+def _touch_row(name: str, model: Polyhedron, kind: int, approaches: int, seed: int) -> Row:
+    import numpy as np
+
+    from ..envs.scene import OBJECT, ProbeScene
+    from .bench_report import Row, steps
+    from .touch_cases import FACE, KINDS, ApproachSampler, depth_in_hull
+
+    rng = np.random.default_rng([seed, kind, *model.name.encode()])
+    sensor = _sensor(name, model)
+    sampler = ApproachSampler(model, RADIUS, sensor.reach)
+    scene = ProbeScene(model)
+    apart, turned, right, notched, reached = [], [], [], 0, set()
+    what = f"{model.name}, {KINDS[kind]}"
+    for index in steps(range(approaches), f"{name}: {what}"):
+        approach = sampler.draw(kind, index % sampler.count(kind), rng)
+        if approach is None:
+            continue
+        swept = approach.swept
+        scene.place(approach.T_world_object)
+        (felt,) = sensor.feel(scene, approach.start_world[None], approach.direction_world[None])
+        apart.append(float(np.linalg.norm(felt.position_world - swept.position_world)))
+        away = float(np.linalg.norm(felt.normal_world - swept.normal_world))
+        turned.append(float(np.degrees(2.0 * np.arcsin(min(away / 2.0, 1.0)))))
+        right.append(felt.outcome == OBJECT and felt.kind == kind)
+        contact = approach.T_world_object.inv().apply(swept.position_world)
+        notched += depth_in_hull(model, contact) > NOTCH
+        reached.add(approach.feature)
+    if not apart:
+        return Row(what, "none reached", "", False)
+    goal = POSITION_GOAL[name]
+    met = max(apart) <= goal and float(np.mean(right)) >= KIND_GOAL
+    if kind == FACE:
+        met = met and max(turned) <= NORMAL_GOAL
+    return Row(
+        what,
+        f"{1e6 * max(apart):.3f} µm",
+        f"{1e6 * goal:g} µm",
+        met,
+        [
+            f"median {1e6 * np.median(apart):.3f} µm; normal within {max(turned):.2g}°; kind right"
+            f" in {np.mean(right):.2%} of {len(apart)}; {len(reached)} of {sampler.count(kind)}"
+            f" reached; {notched} in notches"
+        ],
+    )
+
+
+def _sensor(name: str, model: Polyhedron) -> BallSensor | FingerSensor:
+    import numpy as np
+
+    from ..envs.ball_sensor import BallSensor
+    from ..envs.finger import FingerDesign
+    from ..envs.finger_sensor import FingerSensor
+    from ..envs.noise import SensorNoise
+    from ..envs.probe_env import INCH, REACH
+
+    noise = SensorNoise(position_error=0.01 * INCH, normal_error=np.pi / 10.0)
+    reach = REACH * model.diameter
+    if name == "ball":
+        return BallSensor(noise, reach, RADIUS)
+    return FingerSensor(noise, reach, FingerDesign(radius=RADIUS))
+
+
+def measure_speed(seed: int) -> Section:
+    """How long a triad of each sensor takes, around each stand-in."""
+    from ..envs.library import load_library
+    from .bench_report import Section
+
+    rows = [_speed_row(name, model, seed) for name in TRIAD_GOAL for model in load_library()]
+    return Section(
+        "a triad, command to report, median / 99th percentile of processor time",
+        rows,
+        "Triads meet anywhere in the square that the environment sends them to, around objects"
+        " placed as the environment places them.",
+    )
+
+
+def _speed_row(name: str, model: Polyhedron, seed: int) -> Row:
+    import numpy as np
+
+    from ..envs.noise import SensorNoise
+    from ..envs.placement import AcrossPlane
+    from ..envs.probe_env import HALF_WIDTH, INCH, REACH
+    from ..envs.scene import ProbeScene
+    from ..envs.sensors import make_sensor
+    from ..envs.touch import ProbeCommand
+    from .bench_report import Row, median_and_tail, steps, timed
+
+    rng = np.random.default_rng(seed)
+    noise = SensorNoise(position_error=0.01 * INCH, normal_error=np.pi / 10.0)
+    sensor = make_sensor(name, noise, REACH * model.diameter)
+    half_width = HALF_WIDTH * model.diameter
+    scene, placement = ProbeScene(model), AcrossPlane(offset=0.2 * half_width)
+    seconds, contacts = [], 0
+    for index in steps(range(TRIADS), f"speed: {name}, {model.name}"):
+        if index % (TRIADS // PLACES) == 0:
+            scene.place(placement.draw(rng, model))
+        x, y, yaw = rng.uniform(-1.0, 1.0, 3) * (half_width, half_width, np.pi / 3.0)
+        command = ProbeCommand(float(x), float(y), float(yaw))
+        touch, spent = timed(sensor.touch, scene, command, rng)
+        seconds.append(spent)
+        contacts += len(touch.contacts)
+    median, tail = median_and_tail(seconds)
+    goal = 1e3 * TRIAD_GOAL[name]
+    return Row(
+        f"{name}, {model.name}",
+        f"{median:.3f} / {tail:.2f} ms",
+        f"{goal:g} ms",
+        median <= goal,
+        [f"{contacts / TRIADS:.2f} contacts a triad"],
+    )
+
+
+if __name__ == "__main__":
+    app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+    app.command()(bench_touch)
+    app()
