@@ -5,7 +5,7 @@ from __future__ import annotations
 import json as json_format
 from collections import Counter
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal, cast
 
 import typer
 
@@ -21,6 +21,8 @@ __all__ = ["episode"]
 
 MOST_POSES = 4000
 """How many poses the JSON document lists of all families together, one a hypothesis at least."""
+MOST_NAMED = 3
+"""Rays of a probe whose outcomes are told one by one."""
 MOST_GHOSTS = 2
 """More rivals than this in one picture hide each other."""
 
@@ -44,6 +46,21 @@ def episode(
             show_default=False,
         ),
     ] = None,
+    sensor: Annotated[
+        str,
+        typer.Option(
+            metavar="NAME",
+            help="What touches: ray, ball, finger (a ball tip driven by dynamics), range (a"
+            " scanner) or range-grid.",
+        ),
+    ] = "ray",
+    placement: Annotated[
+        str,
+        typer.Option(
+            metavar="HOW",
+            help="How the object lies: across the plane, resting on it, or dropped on it.",
+        ),
+    ] = "across",
     policy: Annotated[
         str, typer.Option(metavar="NAME", help="The strategy that chooses the probes.")
     ] = "random",
@@ -89,6 +106,8 @@ def episode(
     env = ProbeEnv(
         library,
         object_name=object_name,
+        placement=cast("Literal['across', 'resting', 'dropped']", placement),
+        sensor=sensor,
         position_error=position_error,
         normal_error=float(np.radians(normal_error_deg)),
         max_probes=max_probes,
@@ -97,7 +116,8 @@ def episode(
     rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(1)[0])
     console = Console(highlight=False, quiet=json, soft_wrap=True)
     console.print(
-        f"An unknown object, one of {len(env.library)}, lies across a plane (seed {seed},"
+        f"An unknown object, one of {len(env.library)},"
+        f" {'lies across' if placement == 'across' else 'stands on'} a plane (seed {seed},"
         f" positions ±{1e3 * position_error:.3g} mm, normals ±{normal_error_deg:.3g}°)."
     )
     console.print(
@@ -127,7 +147,10 @@ def _told(number: int, touch: Touch, belief: Belief | None) -> str:
     from ..envs.scene import NOTHING, OBJECT, PLANE
 
     names = {OBJECT: "object", PLANE: "plane", NOTHING: "nothing"}
-    met = " ".join(f"{names[int(outcome)]:<6}" for outcome in touch.outcomes)
+    outcomes = [names[int(outcome)] for outcome in touch.outcomes]
+    met = " ".join(f"{outcome:<6}" for outcome in outcomes)
+    if len(outcomes) > MOST_NAMED:
+        met = f"{', '.join(f'{many} {name}' for name, many in Counter(outcomes).items()):<20}"
     if belief is None:
         return f"probe {number:>2}  {met}  {'':>15}  nothing touched yet"
     per_object = Counter(hypothesis.object_name for hypothesis in belief.hypotheses)

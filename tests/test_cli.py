@@ -52,6 +52,33 @@ def test_an_episode_tells_its_story_and_draws_it(tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["end.png"]
 
 
+def test_a_ball_finds_an_object_that_stands_on_the_plane(tmp_path):
+    options = ("--object", "simple-hand", "--sensor", "ball", "--placement", "resting")
+    told = palpate("episode", *options, "--no-picture", cwd=tmp_path)
+    assert told.returncode == 0, told.stderr
+    assert "stands on a plane" in told.stdout
+    assert "It is simple-hand." in told.stdout
+
+
+def test_the_many_rays_of_a_scanner_are_counted(tmp_path):
+    options = ("--object", "simple-hand", "--sensor", "range", "--max-probes", "1")
+    told = palpate("episode", *options, "--no-picture", cwd=tmp_path)
+    assert told.returncode == 0, told.stderr
+    assert "12 object, 24 plane" in told.stdout
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "says"),
+    [("--sensor", "foot", "ray, ball, finger"), ("--placement", "flying", "'resting'")],
+)
+def test_a_sensor_or_a_placement_that_there_is_not_is_one_line(tmp_path, option, value, says):
+    told = palpate("episode", option, value, "--no-picture", cwd=tmp_path)
+    assert told.returncode == 2
+    assert says in told.stderr
+    assert value in told.stderr
+    assert len(told.stderr.splitlines()) == 1
+
+
 def test_the_same_seed_prints_the_same_story(tmp_path):
     once, again = (palpate("episode", "--no-picture", cwd=tmp_path).stdout for _ in range(2))
     assert once == again
