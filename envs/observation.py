@@ -47,6 +47,7 @@ class ObservationLayout:
                 "contact_normals": box(-1.0, 1.0, rays, 3),
                 "contact_position_error": box(0.0, extent, rays),
                 "contact_normal_error": box(0.0, np.pi, rays),
+                "contact_kinds": integers(0, 3, rays),
                 "ray_count": integers(0, rays, 1),
                 "ray_starts": box(-extent, extent, rays, 3),
                 "ray_ends": box(-extent, extent, rays, 3),
@@ -85,6 +86,7 @@ class ObservationLayout:
         values["contact_normals"][:count] = np.clip(contacts.normals, -1.0, 1.0)
         values["contact_position_error"][:count] = contacts.position_error
         values["contact_normal_error"][:count] = contacts.normal_error
+        values["contact_kinds"][:count] = contacts.kinds
         sent = 0
         for touch in touches:
             rows = slice(sent, sent + len(touch.outcomes))

@@ -61,8 +61,8 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
     (`env.half_width`); rays come in at a slant, so they also reach what lies somewhat outside.
 
     ## Observation Space
-    A `Dict` of `Box`es. R is `max_probes` times the sensor's rays (three, for all that have a
-    name), H is `hypotheses_shown`; unused rows are zero.
+    A `Dict` of `Box`es. R is `max_probes` times the sensor's rays (three; of "range" 36, of
+    "range-grid" 147), H is `hypotheses_shown`; unused rows are zero.
 
     | key | shape | meaning |
     |---|---|---|
@@ -71,6 +71,7 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
     | contact_normals | (R, 3) | first n rows: outward unit normals, world |
     | contact_position_error | (R,) | bounds on them, metres |
     | contact_normal_error | (R,) | bounds on them, radians |
+    | contact_kinds | (R,) | 1 face, 2 edge, 3 vertex; 0 unused |
     | ray_count | (1,) | rays sent so far |
     | ray_starts, ray_ends | (R, 3) | segments swept, of a ball by its centre, metres |
     | ray_outcomes | (R,) | 1 object, 2 plane, 3 nothing; 0 not sent |
