@@ -9,17 +9,15 @@ from __future__ import annotations
 import hashlib
 import inspect
 import io
-from collections.abc import Iterator
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..assets import STAND_IN_NAMES, ConvexPart, load_parts
 from ..recognizer import Polyhedron
+from ..recognizer.table_cache import named_arrays
 from . import convex_cells, convex_cuts, convex_joins, hull, parts_check, winding
 from .file_cache import cache_folder, keep, read_kept
 from .hull import Hull
@@ -112,7 +110,7 @@ def parts_key(model: Polyhedron) -> str:
     """A hash, in hexadecimal, of everything that an object's parts depend on."""
     digest = hashlib.blake2b(_builders(), digest_size=20)
     digest.update((model.name if model.name in STAND_IN_NAMES else "").encode())
-    for name, array in _arrays(model):
+    for name, array in named_arrays(model):
         # Types and shapes too, so that no two lists of arrays have the same bytes.
         digest.update(f"{name} {array.dtype.str} {array.shape};".encode())
         digest.update(np.ascontiguousarray(array).data)
@@ -122,16 +120,6 @@ def parts_key(model: Polyhedron) -> str:
 @cache
 def _builders() -> bytes:
     return "".join(inspect.getsource(module) for module in BUILDERS).encode()
-
-
-def _arrays(value: Any, prefix: str = "") -> Iterator[tuple[str, NDArray[Any]]]:
-    """All arrays of a dataclass and of the dataclasses in it, each under its dotted name."""
-    for field in fields(value):
-        part, name = getattr(value, field.name), prefix + field.name
-        if is_dataclass(part):
-            yield from _arrays(part, f"{name}.")
-        elif isinstance(part, np.ndarray):
-            yield name, part
 
 
 def _pack(found: CollisionParts) -> bytes:

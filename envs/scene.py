@@ -229,9 +229,14 @@ def _add_mesh(
     )
 
 
+def _crosses(corners: Floats) -> Floats:
+    """(t, 3) normals of triangles (t, 3, 3), twice as long as their areas."""
+    return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+
 def _unit_crosses(corners: Floats) -> Floats:
     """(t, 3) unit normals of triangles (t, 3, 3); zero for one without an area."""
-    crosses = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    crosses = _crosses(corners)
     sizes = np.linalg.norm(crosses, axis=1, keepdims=True)
     return crosses / np.where(sizes > 0.0, sizes, 1.0)
 
@@ -268,14 +273,9 @@ def _narrowest_face(model: Polyhedron) -> float:
     corners = model.vertices[model.triangles]
     sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
     widths = np.zeros(model.face_count)
-    np.maximum.at(widths, model.triangle_faces, 2.0 * _areas(corners) / sides.max(axis=1))
+    doubled_areas = np.linalg.norm(_crosses(corners), axis=1)
+    np.maximum.at(widths, model.triangle_faces, doubled_areas / sides.max(axis=1))
     return float(widths.min())
-
-
-def _areas(corners: Floats) -> Floats:
-    """(t,) areas of triangles (t, 3, 3), square metres."""
-    crosses = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    return 0.5 * np.linalg.norm(crosses, axis=1)
 
 
 def _part_leaning(mj_model: mujoco.MjModel, geom: int, part: ConvexPart) -> float:

@@ -84,8 +84,8 @@ def default_folder() -> Path | None:
 def table_key(model: Polyhedron, features: Features | None = None) -> str:
     """A hash, in hexadecimal, of everything that a model's tables depend on."""
     digest = hashlib.blake2b(_builders(), digest_size=20)
-    given = [] if features is None else _arrays(features, "features.")
-    for name, array in (*_arrays(model), *given):
+    given = [] if features is None else named_arrays(features, "features.")
+    for name, array in (*named_arrays(model), *given):
         # Types and shapes too, so that no two lists of arrays have the same bytes.
         digest.update(f"{name} {array.dtype.str} {array.shape};".encode())
         digest.update(np.ascontiguousarray(array).data)
@@ -99,12 +99,12 @@ def _builders() -> bytes:
     return MAGIC + names.encode() + sources.encode()
 
 
-def _arrays(value: Any, prefix: str = "") -> Iterator[tuple[str, Array]]:
+def named_arrays(value: Any, prefix: str = "") -> Iterator[tuple[str, Array]]:
     """All arrays of a dataclass and of the dataclasses in it, each under its dotted name."""
     for field in fields(value):
         part, name = getattr(value, field.name), prefix + field.name
         if is_dataclass(part):
-            yield from _arrays(part, f"{name}.")
+            yield from named_arrays(part, f"{name}.")
         elif isinstance(part, np.ndarray):
             yield name, part
 
