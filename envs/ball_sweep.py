@@ -44,7 +44,7 @@ class BallContact:
 
 
 class BallSweep:
-    """A ball of some radius in a scene, for as long as the object stays where it is."""
+    """A ball of some radius in a scene, for as long as that isn't compiled anew."""
 
     def __init__(self, scene: ProbeScene, radius: float) -> None:
         """A ball of ``radius`` metres; the scene gets collision geometry if it has none.
@@ -56,7 +56,6 @@ class BallSweep:
         self._model, self._data = scene.mj_model, scene.mj_data
         self._point, self._parts = scene.point_geom, scene.part_geoms
         self._radius = radius
-        self._middles = self._data.geom_xpos[self._parts]
         self._reaches = scene.part_reaches + radius
         self._place = self._data.geom_xpos[self._point]
         self._ends = np.zeros(6)
@@ -115,7 +114,7 @@ class BallSweep:
 
         Depths along the ray, as a heap.
         """
-        middles = self._middles - start
+        middles = self._data.geom_xpos[self._parts] - start
         along = middles @ direction
         half = self._reaches**2 - (middles**2).sum(axis=1) + along**2
         waiting = []

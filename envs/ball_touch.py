@@ -4,12 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import reduce
 from math import sin
+from operator import or_
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..recognizer import Contacts, FreeSpace
+from ..recognizer.contacts import APPROACH_ERROR
+from .free_body import STILL, Displacement
 from .noise import SensorNoise
 from .scene import OBJECT, ProbeScene
 from .touch import Touch
@@ -36,6 +40,10 @@ class BallFelt:
     """How much farther along the ray it was when it felt that, metres."""
     forces: Floats = field(default_factory=lambda: np.zeros((0, 2)))
     """(k, 2) seconds and newtons."""
+    moved: Displacement = STILL
+    """How far the object moved from then to the end of the probe."""
+    moved_in_all: Displacement = STILL
+    """How far it moved from the start of the ray to the end of the probe."""
 
 
 def kind_of(scene: ProbeScene, point_world: Floats, normal_world: Floats) -> int:
@@ -84,13 +92,15 @@ def report(
     pressed = np.array([one.pressed for one in felt])
     ends = np.where(hit, np.maximum(reached - pressed - lever, 0.0), reached)
     straight = exact >= 0.0
-    count = int(hit.sum())
+    # Both are to hold for the object as it lies when the probe ends.
+    since = np.array([(one.moved.distance, one.moved.turn) for one in felt])
+    since_start = np.array([one.moved_in_all.distance for one in felt])
     kinds = np.array([one.kind for one in felt], np.int8)
     contacts = Contacts(
         positions[hit],
         normals[hit],
-        position_error=np.full(count, noise.position_error),
-        normal_error=np.full(count, noise.normal_error),
+        position_error=noise.position_error + since[hit, 0],
+        normal_error=np.minimum(noise.normal_error + since[hit, 1], np.pi),
         approaches=np.where(_facing(felt, directions)[:, None], directions, 0.0)[hit],
         kinds=kinds[hit],
     )
@@ -98,7 +108,7 @@ def report(
         starts[straight],
         (starts + ends[:, None] * directions)[straight],
         radius=radius,
-        error=noise.position_error,
+        error=noise.position_error + since_start[straight],
     )
     forces = tuple(one.forces for one in felt)
     return Touch(
@@ -108,10 +118,16 @@ def report(
         starts + reached[:, None] * directions,
         outcomes,
         forces if any(len(force) for force in forces) else (),
+        reduce(or_, (one.moved | one.moved_in_all for one in felt)),
+        radius,
     )
 
 
 def _facing(felt: Sequence[BallFelt], directions: Floats) -> NDArray[np.bool_]:
-    """Which contacts face where the ball came from: all, but for a tip that slid on."""
+    """Which contacts are known to face where the ball came from, as the object lies now.
+
+    All, but for a tip that slid on, and an object that has turned too far since.
+    """
     normals = np.array([one.normal_world for one in felt])
-    return (normals * directions).sum(axis=1) < 0.0
+    turned = np.array([one.moved.turn for one in felt])
+    return ((normals * directions).sum(axis=1) < 0.0) & (turned <= APPROACH_ERROR)

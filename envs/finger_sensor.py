@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import RigidTransform
 
 from .ball_sensor import ball_errors
 from .ball_sweep import BallSweep
 from .ball_touch import BallFelt, report
 from .finger import FingerDesign
+from .free_body import displacement
 from .guarded_move import TRAVEL_SHARE, GuardedMove
 from .noise import SensorNoise
 from .scene import ProbeScene
@@ -30,7 +33,8 @@ class FingerSensor:
 
     Each ray is a guarded move: at a set speed until the tip touches, or until it is pressed by a
     set force; then it retreats. The way through the air is the same for any step of time and is
-    not simulated but for its end.
+    not simulated but for its end. An object that is free to move may be pushed; it comes to rest
+    before the next ray.
     """
 
     rays: int = 3
@@ -118,8 +122,22 @@ class FingerSensor:
         """
         scene.mount(self.design)
         sweep = BallSweep(scene, self.design.radius)
-        felt = []
+        felt: list[BallFelt] = []
+        poses: list[tuple[RigidTransform, RigidTransform]] = []
         for start, direction in zip(starts, directions, strict=True):
+            before = scene.T_world_object
             move = GuardedMove(scene, sweep, start, direction, self.speed, self.force_threshold)
             felt.append(move.run())
-        return felt
+            poses.append((before, scene.T_world_object))
+            scene.settle()
+        if not scene.free:
+            return felt
+        model, now = scene.model, scene.T_world_object
+        return [
+            replace(
+                one,
+                moved=displacement(model, touched, now),
+                moved_in_all=displacement(model, before, now),
+            )
+            for one, (before, touched) in zip(felt, poses, strict=True)
+        ]

@@ -30,11 +30,21 @@ class Displacement:
         if not 0.0 <= self.turn <= np.pi:
             raise ValueError(f"turn is {self.turn:g} rad; it must be from 0 to pi")
 
+    def __or__(self, other: Displacement) -> Displacement:
+        """A bound on either."""
+        return Displacement(
+            distance=max(self.distance, other.distance), turn=max(self.turn, other.turn)
+        )
+
     def __add__(self, other: Displacement) -> Displacement:
         """A bound on one after the other, by the triangle inequality, for points and for turns."""
         return Displacement(
             distance=self.distance + other.distance, turn=min(self.turn + other.turn, np.pi)
         )
+
+
+STILL = Displacement(distance=0.0, turn=0.0)
+"""Of what hasn't moved."""
 
 
 def displacement(
@@ -94,6 +104,7 @@ def grown(
         position_error=error[kept],
         normal_error=np.minimum(contacts.normal_error[kept] + moved.turn, np.pi),
         approaches=contacts.approaches[kept] if still_known else None,
+        kinds=contacts.kinds[kept],
     )
 
 

@@ -73,7 +73,7 @@ class GuardedMove:
         scene.mj_model.opt.timestep = self._step
 
     def run(self) -> BallFelt:
-        """Move until something is felt, and back.
+        """Move until something is felt, and back; the scene is told where a free object was then.
 
         Raises:
             ValueError: the tip starts in the object.
@@ -98,6 +98,7 @@ class GuardedMove:
             if not self._on_its_way(depth):
                 return self._back(depth, self._nothing())
             grazed = True
+            self._scene.settle()  # the next contact is looked for from an object at rest
 
     def _approach(self, depth: float, until: float) -> tuple[float, list[TipContact]]:
         """Come to ``depth`` at full speed, and go on until something touches or is passed."""
@@ -160,6 +161,7 @@ class GuardedMove:
     def _at_first_contact(self, contacts: list[TipContact], depth: float) -> BallFelt:
         """What is felt at the first step with a contact, taken back to where the tip met it."""
         backs = [self._way_back(contact) for contact in contacts]
+        self._scene.follow()
         # Of several, the tip met the one first that it has gone on from the farthest.
         contact, back = max(zip(contacts, backs, strict=True), key=lambda pair: pair[1])
         centre = contact.centre_world - back * self._direction
@@ -184,6 +186,7 @@ class GuardedMove:
         The nearest place of one part can be inside another only if the tip is deeper in that one;
         so under the deepest contact is the object's own surface.
         """
+        self._scene.follow()
         contact = max(contacts, key=lambda one: one.depth)
         distance = self._radius - contact.depth
         position = contact.centre_world - distance * contact.normal_world

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -71,7 +72,7 @@ class ObservationLayout:
     def pack(
         self,
         contacts: Contacts,
-        touches: list[Touch],
+        touches: Sequence[Touch],
         belief: Belief | None,
         object_index: dict[str, int],
     ) -> Observation:

@@ -104,6 +104,21 @@ class Resting:
         return SupportPlane(error=RESTING_ERROR * model.diameter, resting=True)
 
 
+def make_placement(name: str, offset: float) -> Placement:
+    """The placement of a name: "across", "resting" or "dropped".
+
+    Raises:
+        ValueError: another name.
+    """
+    if name == "across":
+        return AcrossPlane(offset=offset)
+    if name == "resting":
+        return Resting(offset=offset)
+    if name == "dropped":
+        return Resting(offset=offset, mode="dropped")
+    raise ValueError(f"placement is {name!r}; it must be 'across', 'resting' or 'dropped'")
+
+
 def _around_origin(
     rng: np.random.Generator, rotation: Rotation, model: Polyhedron, offset: float, lift: float
 ) -> RigidTransform:

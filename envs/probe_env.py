@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, Literal
 
 import gymnasium
@@ -13,23 +15,30 @@ from scipy.spatial.transform import RigidTransform
 from ..recognizer import (
     Belief,
     Contacts,
-    FreeSpace,
     Polyhedron,
     PoseTolerance,
     Recognizer,
     SearchLimits,
+    SupportPlane,
 )
+from .evidence import Evidence
+from .finger_sensor import FingerSensor
+from .free_body import STILL
+from .free_object import SINK, FreeObject
 from .library import LibrarySource, load_library
 from .noise import Distribution, SensorNoise
 from .observation import Observation, ObservationLayout
-from .placement import AcrossPlane, Placement, Resting
+from .placement import make_placement
 from .scene import ProbeScene
-from .sensors import make_sensor
+from .sensors import make_sensors
 from .touch import ProbeCommand, Sensor, Touch
 
 INCH = 0.0254
 HALF_WIDTH = 0.375
 """Half the side of the square that triads meet in, in diameters of the largest object."""
+KEPT_WITHIN = 0.02
+"""Contacts with an object that was pushed since are dropped once their places are known to no
+better than this, in diameters of the largest object."""
 REACH = 2.0
 """Rays start this many diameters of the largest object before the point where they meet."""
 
@@ -46,16 +55,17 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
 
     What goes along the rays is the sensor: points ("ray", the memo's ideal probe), balls that stop
     where they first touch ("ball"), or a finger with a ball tip, driven by dynamics ("finger").
-    Balls and fingers touch edges and vertices too.
+    Balls and fingers touch edges and vertices too. With several sensors each probe says which.
 
     ## Action Space
-    `Box(-1, 1, (3,))`, float32:
+    `Box(-1, 1, (3,))`, float32; with several sensors `(4,)`:
 
     | number | meaning | -1 | 1 |
     |---|---|---|---|
     | 0 | x of the meeting point | -half width | half width |
     | 1 | y of the meeting point | -half width | half width |
     | 2 | yaw of the triad | -60 degrees | 60 degrees |
+    | 3 | sensor, the range cut into equal parts | the first | the last |
 
     The half width is three eighths of the diameter of the library's largest object
     (`env.half_width`); rays come in at a slant, so they also reach what lies somewhat outside.
@@ -94,14 +104,18 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
     - "resting": standing on the plane, on a face drawn by how often a slow tumble ends on it;
     - "dropped": as it comes to rest in a simulated drop.
 
-    In the last two the recogniser knows that the object stands on the plane.
+    In the last two the recogniser knows that the object stands on the plane. There it may also be
+    `free`: a finger then pushes it about. It comes to rest after each ray, what was felt before
+    holds with bounds wider by how far it moved, and is dropped once it says too little.
 
     ## Episode End
     Terminated when one hypothesis is left, up to the object's symmetry and with its pose fixed, or
     none. Truncated after `max_probes`.
 
     ## Info
-    `truth`, for scoring alone: `object` (name) and `pose` (4, 4), model to world.
+    `truth`, for scoring alone: `object` (name) and `pose` (4, 4), model to world. Of a free object
+    also `displacement`, what a tracker would tell: the largest `distance` (metres) by which a point
+    of it was moved by the last probe, and the `turn` (radians).
 
     ## Arguments
     | name | default | meaning |
@@ -109,11 +123,15 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
     | library | None | names of stand-ins, models, or a folder of meshes; None: all stand-ins |
     | object_name | None | always this object; None: drawn at reset |
     | placement | across | "across", "resting" or "dropped" |
-    | sensor | ray | "ray", "ball", "finger", "range", "range-grid", or a ready `Sensor` |
+    | free | False | whether a standing object moves when it is pushed |
+    | mass | None | of a free object, kilograms; None: that of its volume in water |
+    | friction | None | between a free object and the plane; None: 0.5 |
+    | sensor | ray | "ray", "ball", "finger", "range", "range-grid", a `Sensor`, or several |
     | position_error | 0.000254 | bound on positions, metres (0.01 in) |
     | normal_error | pi / 10 | bound on normals, radians |
     | distribution | uniform | of the noise inside its bounds: "uniform" or "gaussian" |
     | radius | None | of a ball or a finger's tip, metres; None: 0.002 |
+    | force_threshold | None | at which a finger stops, newtons; None: at first contact |
     | use_free_space | False | whether the recogniser is told of the paths that were free |
     | max_probes | 40 | probes before truncation |
     | hypotheses_shown | 16 | hypotheses in the observation |
@@ -135,11 +153,15 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
         *,
         object_name: str | None = None,
         placement: Literal["across", "resting", "dropped"] = "across",
-        sensor: str | Sensor = "ray",
+        free: bool = False,
+        mass: float | None = None,
+        friction: float | None = None,
+        sensor: str | Sensor | Sequence[str | Sensor] = "ray",
         position_error: float = 0.01 * INCH,
         normal_error: float = np.pi / 10.0,
         distribution: Distribution = "uniform",
         radius: float | None = None,
+        force_threshold: float | None = None,
         use_free_space: bool = False,
         max_probes: int = 40,
         hypotheses_shown: int = 16,
@@ -150,8 +172,9 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
 
         Raises:
             ValueError: an unknown object, placement or sensor, a library that can't be loaded, a
-                bound that isn't positive, a radius that the sensor or the objects don't allow, or
-                fewer than one probe or hypothesis.
+                bound that isn't positive, a radius or a force that the sensor or the objects don't
+                allow, an object that is free but doesn't stand, or a mass or friction of one that
+                isn't free, or fewer than one probe or hypothesis.
         """
         for name, value in (("max_probes", max_probes), ("hypotheses_shown", hypotheses_shown)):
             if value < 1:
@@ -167,34 +190,35 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
         self._object_name = object_name
         largest = max(model.diameter for model in self.library)
         self.half_width = HALF_WIDTH * largest
-        self._placement = _placement(placement, 0.2 * self.half_width)
+        self._placement = make_placement(placement, 0.2 * self.half_width)
+        self._free = _free_object(free, placement, mass, friction)
         # One plane for all: its error is that of the largest object.
-        self._support = max(
-            (self._placement.support(model) for model in self.library),
-            key=lambda plane: plane.error if plane else 0.0,
+        support = self._placement.support(max(self.library, key=lambda model: model.diameter))
+        if support and self._free:
+            support = replace(support, error=support.error + SINK)
+        self._support: SupportPlane | None = support
+        self.sensors = make_sensors(
+            sensor, noise, REACH * largest, radius=radius, force_threshold=force_threshold
         )
-        if isinstance(sensor, str):
-            sensor = make_sensor(sensor, noise, REACH * largest, radius=radius)
-        elif radius is not None:
-            raise ValueError(f"radius is {radius:g}, but a ready sensor has its own")
-        self.sensor = sensor
+        every = any(one.features == "all" for one in self.sensors)
         self.recognizer = Recognizer(
-            self.library, features=sensor.features, tolerance=tolerance, limits=limits
+            self.library, features="all" if every else "faces", tolerance=tolerance, limits=limits
         )
+        self._kept_within = KEPT_WITHIN * largest
         self._use_free_space = use_free_space
         self._scenes: dict[str, ProbeScene] = {}
         self._max_probes = max_probes
         self._layout = ObservationLayout(
-            rays=sensor.rays * max_probes,
+            rays=max(one.rays for one in self.sensors) * max_probes,
             hypotheses=hypotheses_shown,
             objects=len(self.library),
-            extent=2.0 * REACH * largest + sensor.noise.position_error,
+            extent=2.0 * REACH * largest + max(one.noise.position_error for one in self.sensors),
         )
         self.observation_space = self._layout.space()
-        self.action_space = spaces.Box(-1.0, 1.0, (3,), np.float32)
+        self._numbers = 3 if len(self.sensors) == 1 else 4
+        self.action_space = spaces.Box(-1.0, 1.0, (self._numbers,), np.float32)
         self._scene: ProbeScene | None = None
-        self._contacts = Contacts.none()
-        self._touches: list[Touch] = []
+        self._evidence = Evidence.none()
         self._belief: Belief | None = None
 
     @property
@@ -204,13 +228,13 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
 
     @property
     def contacts(self) -> Contacts:
-        """All contacts so far."""
-        return self._contacts
+        """All contacts so far that still hold."""
+        return self._evidence.contacts
 
     @property
     def touches(self) -> tuple[Touch, ...]:
         """What each probe reported."""
-        return tuple(self._touches)
+        return self._evidence.touches
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -221,11 +245,14 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
         drawn = self.library[int(rng.integers(len(self.library)))].name
         name = self._object_name or drawn
         if name not in self._scenes:
-            self._scenes[name] = ProbeScene(self.library[self._index[name]])
+            self._scenes[name] = ProbeScene(self.library[self._index[name]], free=self._free)
         self._scene = self._scenes[name]
+        for sensor in self.sensors:
+            if self._free and isinstance(sensor, FingerSensor):
+                # What else is in the scene tells in the last bits of how an object comes to rest.
+                self._scene.mount(sensor.design)
         self._scene.place(self._placement.draw(rng, self._scene.model))
-        self._contacts = Contacts.none()
-        self._touches = []
+        self._evidence = Evidence.none()
         self._belief = None
         return self._observe(), self._info()
 
@@ -240,20 +267,16 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
         """
         scene = self._placed()
         wanted = np.asarray(action, np.float64)
-        if wanted.shape != (3,) or not np.isfinite(wanted).all():
-            raise ValueError(f"an action is three finite numbers, not {action!r}")
-        x, y, yaw = np.clip(wanted, -1.0, 1.0) * (self.half_width, self.half_width, np.pi / 3.0)
-        command = ProbeCommand(float(x), float(y), float(yaw))
-        touch = self.sensor.touch(scene, command, self.np_random)
-        self._touches.append(touch)
-        if len(touch.contacts):
-            self._contacts = Contacts.join([self._contacts, touch.contacts])
-        if len(self._contacts) and (len(touch.contacts) or self._use_free_space):
-            self._belief = self.recognizer.recognize(
-                self._contacts, free_space=self._known_free(), support=self._support
-            )
+        if wanted.shape != (self._numbers,) or not np.isfinite(wanted).all():
+            wanted_are = "three" if self._numbers == 3 else "four"
+            raise ValueError(f"an action is {wanted_are} finite numbers, not {action!r}")
+        x, y, yaw, *choice = np.clip(wanted, -1.0, 1.0).tolist()
+        command = ProbeCommand(x * self.half_width, y * self.half_width, yaw * np.pi / 3.0)
+        touch = self._chosen(*choice).touch(scene, command, self.np_random)
+        self._evidence = self._evidence.after(touch, self._kept_within)
+        self._recognize(touch)
         ended = self._belief is not None and (self._belief.unique or self._belief.empty)
-        truncated = len(self._touches) >= self._max_probes
+        truncated = len(self.touches) >= self._max_probes
         return self._observe(), -1.0, ended, truncated, self._info()
 
     @property
@@ -271,27 +294,51 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
             raise gymnasium.error.ResetNeeded("call reset first")
         return self._scene
 
-    def _known_free(self) -> FreeSpace | None:
-        if not self._use_free_space:
-            return None
-        return FreeSpace.join([touch.free_space for touch in self._touches])
+    def _chosen(self, choice: float = -1.0) -> Sensor:
+        """The sensor that an action's last number, in [-1, 1], stands for."""
+        count = len(self.sensors)
+        return self.sensors[min(int(0.5 * (choice + 1.0) * count), count - 1)]
+
+    def _recognize(self, touch: Touch) -> None:
+        """Have the belief be that of the evidence, to which a touch was added last."""
+        known = self._evidence
+        if not (len(touch.contacts) or self._use_free_space or known.changed):
+            return
+        if not len(known.contacts):
+            self._belief = None
+            return
+        support = self._support
+        if self._free and support and not self._placed().stands(support.error):
+            support = None  # it leans on something, or rolls: the promise doesn't hold
+        free_space = known.free_space if self._use_free_space else None
+        self._belief = self.recognizer.recognize(
+            known.contacts, free_space=free_space, support=support
+        )
 
     def _observe(self) -> Observation:
         # Past max_probes an episode may be stepped on; the observation keeps its last rows.
-        touches = self._touches[-self._max_probes :]
-        contacts = self._contacts[slice(-self.sensor.rays * self._max_probes, None)]
+        touches = self.touches[-self._max_probes :]
+        contacts = self.contacts[slice(-self._layout.rays, None)]
         return self._layout.pack(contacts, touches, self._belief, self._index)
 
     def _info(self) -> dict[str, Any]:
         pose = self.T_world_object.as_matrix()
-        return {"truth": {"object": self.true_object.name, "pose": pose}}
+        info: dict[str, Any] = {"truth": {"object": self.true_object.name, "pose": pose}}
+        if self._free:
+            moved = self.touches[-1].displacement if self.touches else STILL
+            info["displacement"] = {"distance": moved.distance, "turn": moved.turn}
+        return info
 
 
-def _placement(name: str, offset: float) -> Placement:
-    if name == "across":
-        return AcrossPlane(offset=offset)
-    if name == "resting":
-        return Resting(offset=offset)
-    if name == "dropped":
-        return Resting(offset=offset, mode="dropped")
-    raise ValueError(f"placement is {name!r}; it must be 'across', 'resting' or 'dropped'")
+def _free_object(
+    free: bool, placement: str, mass: float | None, friction: float | None
+) -> FreeObject | None:
+    """How the object moves, if it does."""
+    if not free:
+        for name, value in (("mass", mass), ("friction", friction)):
+            if value is not None:
+                raise ValueError(f"{name} is {value:g}, but the object is held: give free=True")
+        return None
+    if placement == "across":
+        raise ValueError("a free object has to stand: placement must be 'resting' or 'dropped'")
+    return FreeObject(mass=mass) if friction is None else FreeObject(mass=mass, friction=friction)

@@ -133,7 +133,8 @@ class ProbeFingerEnv(ProbeEnv):
     One object of the library is held at an unknown pose, any orientation, across the support plane
     ``z = 0``, or stands on it. A finger with a ball tip makes three guarded moves, all downwards at
     right angles to each other, that meet at a point (x, y, 0) of the plane: on each its tip is
-    driven along the ray by force-limited actuators, stops where it first touches, and goes back. It
+    driven along the ray by force-limited actuators, stops where it first touches, or where it is
+    pressed with a force, and goes back. It
     reports where it touched the object, the normal there, and whether that was on a face, a convex
     edge or a vertex, or that it reached the plane. After each probe the recogniser says which
     hypotheses (object and pose) the contacts so far allow.
@@ -179,14 +180,18 @@ class ProbeFingerEnv(ProbeEnv):
     ## Starting State
     The object is drawn from the library; its centroid lies within a fifth of the half width of the
     origin. By `placement` it is held "across" the plane at any orientation, uniform, 10 to 50 % of
-    its height below it, or stands on it, "resting" or "dropped"; then the recogniser knows so.
+    its height below it, or stands on it, "resting" or "dropped"; then the recogniser knows so. One
+    that stands may be `free`: the finger pushes it about. It comes to rest after each ray; what was
+    felt before holds with bounds wider by how far it moved, and is dropped once it says too little.
 
     ## Episode End
     Terminated when one hypothesis is left, up to the object's symmetry and with its pose fixed, or
     none. Truncated after `max_probes`.
 
     ## Info
-    `truth`, for scoring alone: `object` (name) and `pose` (4, 4), model to world.
+    `truth`, for scoring alone: `object` (name) and `pose` (4, 4), model to world. Of a free object
+    also `displacement`, what a tracker would tell: the largest `distance` (metres) by which a point
+    of it was moved by the last probe, and the `turn` (radians).
 
     ## Arguments
     | name | default | meaning |
@@ -194,7 +199,11 @@ class ProbeFingerEnv(ProbeEnv):
     | library | None | names of stand-ins, models, or a folder of meshes; None: all stand-ins |
     | object_name | None | always this object; None: drawn at reset |
     | placement | across | "across", "resting" or "dropped" |
+    | free | False | whether a standing object moves when it is pushed |
+    | mass | None | of a free object, kilograms; None: that of its volume in water |
+    | friction | None | between a free object and the plane; None: 0.5 |
     | radius | 0.002 | of the tip, metres |
+    | force_threshold | None | at which the finger stops, newtons; None: at first contact |
     | position_error | 0.000254 | bound on positions, metres (0.01 in) |
     | normal_error | pi / 10 | bound on normals, radians |
     | distribution | uniform | of the noise inside its bounds: "uniform" or "gaussian" |
@@ -217,7 +226,11 @@ class ProbeFingerEnv(ProbeEnv):
         *,
         object_name: str | None = None,
         placement: Literal["across", "resting", "dropped"] = "across",
+        free: bool = False,
+        mass: float | None = None,
+        friction: float | None = None,
         radius: float = 0.002,
+        force_threshold: float | None = None,
         position_error: float = 0.01 * INCH,
         normal_error: float = np.pi / 10.0,
         distribution: Distribution = "uniform",
@@ -236,8 +249,12 @@ class ProbeFingerEnv(ProbeEnv):
             library,
             object_name=object_name,
             placement=placement,
+            free=free,
+            mass=mass,
+            friction=friction,
             sensor="finger",
             radius=radius,
+            force_threshold=force_threshold,
             position_error=position_error,
             normal_error=normal_error,
             distribution=distribution,

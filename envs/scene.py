@@ -16,7 +16,7 @@ from typing import Any
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import RigidTransform, Rotation
+from scipy.spatial.transform import RigidTransform
 
 from ..assets import ConvexPart
 from ..recognizer import Polyhedron
@@ -24,6 +24,8 @@ from ..recognizer.rays import cast_rays
 from .collision import CollisionParts, collision_parts
 from .feature_kind import FeatureKinds
 from .finger import Finger, FingerDesign, add_finger
+from .free_object import FreeBody, FreeObject, set_free
+from .mesh_rounding import mesh_leaning, narrowest_face, part_leaning, reach
 
 Floats = NDArray[np.float64]
 
@@ -65,16 +67,23 @@ class RayReadings:
 class ProbeScene:
     """One object and the support plane, in MuJoCo."""
 
-    def __init__(self, model: Polyhedron, collision: CollisionParts | None = None) -> None:
+    def __init__(
+        self,
+        model: Polyhedron,
+        collision: CollisionParts | None = None,
+        free: FreeObject | None = None,
+    ) -> None:
         """Compile the scene of an object.
 
         Args:
             model: the object.
             collision: its convex parts; by default `collision_parts` finds them when they are
                 needed.
+            free: how it moves when it is pushed; None holds it where it is placed.
 
         Raises:
-            ValueError: the object is too large or too small to be simulated faithfully.
+            ValueError: the object is too large or too small to be simulated faithfully, or is to
+                move and its convex parts are not known.
         """
         if not SMALLEST_DIAMETER <= model.diameter <= LARGEST_DIAMETER:
             raise ValueError(
@@ -85,8 +94,8 @@ class ProbeScene:
         self.position_rounding = MESH_ROUNDING * model.diameter
         """How far off single precision puts the object's surface, metres."""
         self.T_world_object = RigidTransform.identity()
-        self._collision = collision
-        self._compile((), None)
+        self._collision, self._free = collision, free
+        self._compile(self.collision.parts if free else (), None)
 
     @cached_property
     def collision(self) -> CollisionParts:
@@ -119,12 +128,51 @@ class ProbeScene:
             self._compile(self.collision.parts, finger)
 
     def place(self, T_world_object: RigidTransform) -> None:
-        """Hold the object at a pose, model to world."""
+        """Hold the object at a pose, model to world; a free one comes to rest from there."""
+        self._put(T_world_object)
+        self.settle()
+
+    @property
+    def free(self) -> bool:
+        """Whether the object moves when it is pushed."""
+        return self._free is not None
+
+    def stands(self, error: float) -> bool:
+        """Whether a free object stands on the plane, to within ``error`` metres."""
+        return self._free_body is not None and self._free_body.stands(error)
+
+    def settle(self) -> bool:
+        """Let a free object come to rest; False if it had to be stopped."""
+        if self._free_body is None:
+            return True
+        rests = self._free_body.come_to_rest()
+        self.follow()
+        return rests
+
+    def follow(self) -> None:
+        """Have the pose be the one that the simulation's last contacts were made at."""
+        if self._free_body is not None:
+            self.T_world_object = self._free_body.pose()
+
+    def _put(self, T_world_object: RigidTransform) -> None:
         self.T_world_object = T_world_object
-        # The mesh is given from its centroid: far from the origin, single precision is coarse.
-        self.mj_model.body_pos[self._body] = T_world_object.apply(self.model.centroid)
-        self.mj_model.body_quat[self._body] = T_world_object.rotation.as_quat(scalar_first=True)
+        if self._free_body is None:
+            # The mesh is given from its centroid: far from the origin, single precision is coarse.
+            turn = T_world_object.rotation.as_quat(scalar_first=True)
+            self.mj_model.body_pos[self._body] = T_world_object.apply(self.model.centroid)
+            self.mj_model.body_quat[self._body] = turn
+        else:
+            # Nothing of what the object and the finger did before may stay.
+            mujoco.mj_resetData(self.mj_model, self.mj_data)
+            self._park()
+            self._free_body.put(T_world_object)
         mujoco.mj_forward(self.mj_model, self.mj_data)
+
+    def _park(self) -> None:
+        """Have the finger, if any, out of the way."""
+        if self._finger is not None:
+            above = np.array([0.0, 0.0, PARKED * self.model.diameter])
+            Finger(self.mj_model, self.mj_data).put(above, np.zeros(3))
 
     def cast(self, starts_world: Floats, directions_world: Floats) -> RayReadings:
         """Trace rays until they meet the object or the plane.
@@ -175,35 +223,36 @@ class ProbeScene:
             spec.worldbody.add_geom(
                 name="point", size=[POINT, 0, 0], contype=0, conaffinity=0, group=POINT_GROUP
             )
+        if self._free is not None:
+            set_free(spec, body, self.model, self._free)
         if finger is not None:
             add_finger(spec, finger)
         self.mj_model = spec.compile()
         self.mj_data = mujoco.MjData(self.mj_model)
         self._finger = finger
-        if finger is not None:
-            above = np.array([0.0, 0.0, PARKED * self.model.diameter])
-            Finger(self.mj_model, self.mj_data).put(above, np.zeros(3))
         self._note(parts)
-        self.place(self.T_world_object)
+        self._park()
+        self._put(self.T_world_object)
 
     def _note(self, parts: Sequence[ConvexPart]) -> None:
         """Take down where things are in the compiled model, and how far off it is."""
         mj_model = self.mj_model
+        self._free_body = FreeBody(mj_model, self.mj_data, self.model) if self._free else None
         self._body = mj_model.body("object").id
         self._met = np.empty(1, np.int32)
         self._outcomes = {-1: NOTHING, mj_model.geom("object").id: OBJECT}
         self._outcomes[mj_model.geom("plane").id] = PLANE
         self._seen = RAYS_MEET if parts else None  # without parts there is nothing else to see
-        self._bent = _mesh_leaning(mj_model, self.model) > NORMAL_ROUNDING
+        self._bent = mesh_leaning(mj_model, self.model) > NORMAL_ROUNDING
         self.point_geom = mj_model.geom("point").id if parts else -1
         self.part_geoms = [mj_model.geom(f"part {index}").id for index in range(len(parts))]
-        self.part_reaches = np.array([_reach(mj_model, geom) for geom in self.part_geoms])
+        self.part_reaches = np.array([reach(mj_model, geom) for geom in self.part_geoms])
         pairs = zip(self.part_geoms, parts, strict=True)
-        self.part_leaning = max((_part_leaning(mj_model, *pair) for pair in pairs), default=0.0)
+        self.part_leaning = max((part_leaning(mj_model, *pair) for pair in pairs), default=0.0)
         if parts:
             # Where two planes stray no farther than so much from each other over a face, they lean
             # by no more than twice that over its width.
-            self.part_leaning += 2.0 * self.collision.stray / _narrowest_face(self.model)
+            self.part_leaning += 2.0 * self.collision.stray / narrowest_face(self.model)
 
 
 def _add_mesh(
@@ -227,63 +276,3 @@ def _add_mesh(
         conaffinity=int(collides),
         group=PARTS_GROUP if collides else 0,
     )
-
-
-def _crosses(corners: Floats) -> Floats:
-    """(t, 3) normals of triangles (t, 3, 3), twice as long as their areas."""
-    return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-
-
-def _unit_crosses(corners: Floats) -> Floats:
-    """(t, 3) unit normals of triangles (t, 3, 3); zero for one without an area."""
-    crosses = _crosses(corners)
-    sizes = np.linalg.norm(crosses, axis=1, keepdims=True)
-    return crosses / np.where(sizes > 0.0, sizes, 1.0)
-
-
-def _mesh_leaning(mj_model: mujoco.MjModel, model: Polyhedron) -> float:
-    """How far the normals that rays meet are off the faces' own, radians.
-
-    Pi where the compiled triangles are not the model's any more.
-    """
-    geom = mj_model.geom("object").id
-    mesh = mj_model.geom_dataid[geom]
-    first, count = mj_model.mesh_faceadr[mesh], mj_model.mesh_facenum[mesh]
-    triangles = mj_model.mesh_face[first : first + count]
-    if not np.array_equal(triangles, model.triangles):
-        return np.pi
-    first, count = mj_model.mesh_vertadr[mesh], mj_model.mesh_vertnum[mesh]
-    vertices = mj_model.mesh_vert[first : first + count].astype(np.float64)
-    turn = Rotation.from_quat(mj_model.geom_quat[geom], scalar_first=True)
-    normals = turn.apply(_unit_crosses(vertices[triangles]))
-    off = np.linalg.norm(normals - model.normals[model.triangle_faces], axis=1)
-    return float(2.0 * np.arcsin(np.minimum(off / 2.0, 1.0)).max())
-
-
-def _reach(mj_model: mujoco.MjModel, geom: int) -> float:
-    """The radius of a ball around a mesh geom's own origin that holds it, metres."""
-    mesh = mj_model.geom_dataid[geom]
-    first, count = mj_model.mesh_vertadr[mesh], mj_model.mesh_vertnum[mesh]
-    lengths = np.linalg.norm(mj_model.mesh_vert[first : first + count].astype(np.float64), axis=1)
-    return float(lengths.max()) * (1.0 + 1e-9)
-
-
-def _narrowest_face(model: Polyhedron) -> float:
-    """The least width of a face, metres; of each face that of its widest triangle counts."""
-    corners = model.vertices[model.triangles]
-    sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
-    widths = np.zeros(model.face_count)
-    doubled_areas = np.linalg.norm(_crosses(corners), axis=1)
-    np.maximum.at(widths, model.triangle_faces, doubled_areas / sides.max(axis=1))
-    return float(widths.min())
-
-
-def _part_leaning(mj_model: mujoco.MjModel, geom: int, part: ConvexPart) -> float:
-    """How far the faces of a compiled convex part are off its own, radians."""
-    mesh = mj_model.geom_dataid[geom]
-    first, count = mj_model.mesh_polyadr[mesh], mj_model.mesh_polynum[mesh]
-    turn = Rotation.from_quat(mj_model.geom_quat[geom], scalar_first=True)
-    compiled = turn.apply(mj_model.mesh_polynormal[first : first + count])
-    own = _unit_crosses(part.vertices[part.triangles])
-    off = np.linalg.norm(compiled[:, None] - own[None], axis=2).min(axis=1)
-    return float(2.0 * np.arcsin(np.minimum(off / 2.0, 1.0)).max())

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from .ball_sensor import BallSensor
 from .finger import FingerDesign
 from .finger_sensor import FingerSensor
@@ -57,3 +59,49 @@ def make_sensor(
         return BallSensor(noise, reach, **given)
     design = FingerDesign(radius=given.pop("radius")) if "radius" in given else FingerDesign()
     return FingerSensor(noise, reach, design, **given)
+
+
+def make_sensors(
+    named: str | Sensor | Sequence[str | Sensor],
+    noise: SensorNoise,
+    reach: float,
+    *,
+    radius: float | None = None,
+    force_threshold: float | None = None,
+) -> tuple[Sensor, ...]:
+    """The sensors of an episode: each by name, or ready.
+
+    Args:
+        named: one or several.
+        noise: bounds on what those made here report.
+        reach: of those made here, see `make_sensor`.
+        radius: of the balls and finger tips among them, metres.
+        force_threshold: at which the fingers among them stop, newtons.
+
+    Raises:
+        ValueError: as `make_sensor`; no sensor at all, or an option that none of them has.
+    """
+    wanted = [named] if isinstance(named, str) or not isinstance(named, Sequence) else list(named)
+    if not wanted:
+        raise ValueError("there is no sensor: name at least one of " + ", ".join(SENSOR_NAMES))
+    names = [one for one in wanted if isinstance(one, str)]
+    for option, value, takers in (
+        ("radius", radius, ("ball", "finger")),
+        ("force_threshold", force_threshold, ("finger",)),
+    ):
+        if value is not None and not set(takers) & set(names):
+            if not names:
+                raise ValueError(f"{option} is {value:g}, but a ready sensor has its own")
+            raise ValueError(f"the sensor {', '.join(names)!r} has no {option}")
+    return tuple(
+        make_sensor(
+            one,
+            noise,
+            reach,
+            radius=radius if one in ("ball", "finger") else None,
+            force_threshold=force_threshold if one == "finger" else None,
+        )
+        if isinstance(one, str)
+        else one
+        for one in wanted
+    )

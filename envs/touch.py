@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..recognizer import FACE, Contacts, FreeSpace
+from .free_body import STILL, Displacement
 from .noise import SensorNoise
 
 if TYPE_CHECKING:
@@ -54,6 +55,11 @@ class Touch:
     """(r,) OBJECT, PLANE or NOTHING, see `scene`."""
     forces: tuple[Floats, ...] = ()
     """(k, 2) a ray: seconds, and the normal force on the tip in newtons; none but of a finger."""
+    displacement: Displacement = STILL
+    """How far the object has moved, by the end of the probe, since any instant that was felt of it.
+    Contacts and free space have bounds that hold for where it lies then."""
+    radius: float = 0.0
+    """Of what was moved along the rays, metres; 0 of a point."""
 
 
 class Sensor(Protocol):

@@ -109,7 +109,7 @@ def test_what_balls_touch_is_recognised_with_the_truth_among_it(sensor):
 
 def test_a_ready_sensor_is_taken_as_it_is():
     env = ProbeEnv(SMALL[1:], sensor=READY, max_probes=3, limits=CUT_SHORT)
-    assert env.sensor is READY
+    assert env.sensors == (READY,)
     for observation in play(env, 0, 3)[0]:
         assert env.observation_space.contains(observation)
     assert set(env.contacts.position_error) <= {1e-3}
