@@ -23,7 +23,9 @@ the truth for certain.
 
 from .belief import Belief, Search
 from .comparison import PoseDifference, pose_difference
+from .contact_file import FeltFile, read_contacts
 from .contacts import ANYTHING, EDGE, FACE, VERTEX, Contacts
+from .diagnosis import Finding, diagnose
 from .free_space import FreeSpace
 from .hypotheses import Hypothesis, PoseTolerance
 from .library import load_folder
@@ -42,6 +44,8 @@ __all__ = [
     "Belief",
     "Constraints",
     "Contacts",
+    "FeltFile",
+    "Finding",
     "FreeSpace",
     "Hypothesis",
     "PairTables",
@@ -53,6 +57,8 @@ __all__ = [
     "Search",
     "SearchLimits",
     "SupportPlane",
+    "diagnose",
     "load_folder",
     "pose_difference",
+    "read_contacts",
 ]

@@ -11,11 +11,12 @@ MESH_ENDINGS = (".obj", ".off", ".ply", ".stl")
 """File name endings that count as meshes."""
 
 
-def load_folder(folder: str | os.PathLike[str]) -> tuple[Polyhedron, ...]:
+def load_folder(folder: str | os.PathLike[str], *, scale: float = 1.0) -> tuple[Polyhedron, ...]:
     """Read every mesh of a folder, in alphabetical order, each named after its file.
 
     Args:
-        folder: a folder with closed meshes in metres.
+        folder: a folder with closed meshes.
+        scale: metres in their unit of length.
 
     Raises:
         ValueError: no such folder, no mesh in it, two meshes of one name, or a mesh that is no
@@ -33,4 +34,4 @@ def load_folder(folder: str | os.PathLike[str]) -> tuple[Polyhedron, ...]:
     for file in files:
         if names.count(file.stem) > 1:
             raise ValueError(f"{file}: another mesh in its folder is called {file.stem!r} too")
-    return tuple(Polyhedron.from_mesh(file) for file in files)
+    return tuple(Polyhedron.from_mesh(file, scale=scale) for file in files)

@@ -132,26 +132,35 @@ class Polyhedron:
 
     @classmethod
     def from_mesh(
-        cls, mesh: trimesh.Trimesh | str | os.PathLike[str], *, name: str | None = None
+        cls,
+        mesh: trimesh.Trimesh | str | os.PathLike[str],
+        *,
+        name: str | None = None,
+        scale: float = 1.0,
     ) -> Polyhedron:
         """Read planar faces off a closed mesh.
 
         Args:
             mesh: a trimesh mesh, or the path of a mesh file that trimesh reads (STL, OBJ, PLY,
-                OFF, ...); coordinates are metres.
+                OFF, ...).
             name: what to call the model; by default the file's name without its ending.
+            scale: metres in the mesh's unit of length.
 
         Raises:
             ValueError: a file that is missing or can't be read, a mesh that isn't closed, that
-                encloses no volume, or that has more than `MOST_FACES` planar faces.
+                encloses no volume, or that has more than `MOST_FACES` planar faces; a scale that
+                isn't above zero.
 
         Warns:
             UserWarning: the winding was inverted or inconsistent and has been mended.
         """
         source = "mesh" if _is_mesh(mesh) else str(mesh)
         name = name or Path(source).stem
+        if not (np.isfinite(scale) and scale > 0.0):
+            raise ValueError(f"scale is {scale:g}; it must be above zero")
         try:
-            return cls._from_triangles(*_read(mesh), name)
+            vertices, triangles = _read(mesh)
+            return cls._from_triangles(scale * vertices, triangles, name)
         except ValueError as error:
             raise ValueError(f"{source}: {error}") from error
 

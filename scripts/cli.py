@@ -12,6 +12,7 @@ from typing import Annotated
 import typer
 
 from .episode import episode
+from .recognize import recognize
 from .reproduce import reproduce
 
 __all__ = ["app", "main"]
@@ -24,6 +25,7 @@ app = typer.Typer(
     rich_markup_mode="rich",
 )
 app.command()(episode)
+app.command()(recognize)
 app.command()(reproduce)
 
 BAD_INPUT = 2
