@@ -40,6 +40,8 @@ class BallFelt:
     """How much farther along the ray it was when it felt that, metres."""
     forces: Floats = field(default_factory=lambda: np.zeros((0, 2)))
     """(k, 2) seconds and newtons."""
+    deepest: float = 0.0
+    """How deep a tip was in anything on the whole move, metres."""
     moved: Displacement = STILL
     """How far the object moved from then to the end of the probe."""
     moved_in_all: Displacement = STILL

@@ -26,6 +26,11 @@ DIAMETER = 0.1
 """Of every object as it is dropped, metres."""
 DENSITY = 1000.0
 """Kilograms a cubic metre; where it comes to rest doesn't depend on it."""
+LEAST_INERTIA = 1e-12
+"""Of a body, kg m^2; MuJoCo refuses a hundredth of it. Needles are made heavier."""
+THINNEST = 1e-6
+"""Least moment of inertia, as a share of the greatest, of what can be dropped. A rod has it that is
+not a thousandth as wide as long; the time step is too long for how fast that turns."""
 HEIGHT = 0.05
 """Of its lowest point above the plane at first, in diameters."""
 TIME_STEP = 5e-4
@@ -92,7 +97,7 @@ class DropScene:
             friction: coefficient of sliding friction.
 
         Raises:
-            ValueError: a friction that isn't above zero.
+            ValueError: a friction that isn't above zero, or an object as thin as a needle.
         """
         if not (np.isfinite(friction) and friction > 0.0):
             raise ValueError(f"friction is {friction:g}; it must be above zero")
@@ -124,8 +129,16 @@ class DropScene:
     def _set_mass(self, body: mujoco.MjsBody) -> None:
         properties, scale = mass_properties(self._model, DENSITY), self._scale
         inertia = properties.inertia_object * scale**5
+        least, _, greatest = np.linalg.eigvalsh(inertia).tolist()
+        if least < THINNEST * greatest:
+            raise ValueError(
+                f"{self._model.name} is too thin to be dropped in simulation; place it on a face"
+                " that it can stand on instead"
+            )
+        heavier = max(LEAST_INERTIA / least, 1.0)
+        inertia *= heavier
         body.explicitinertial = True
-        body.mass = properties.mass * scale**3
+        body.mass = heavier * properties.mass * scale**3
         body.ipos = properties.centre_object * scale
         body.fullinertia[:] = *np.diag(inertia), inertia[0, 1], inertia[0, 2], inertia[1, 2]
 

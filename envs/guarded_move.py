@@ -137,7 +137,7 @@ class GuardedMove:
             if quiet == CLEAR:
                 break
         self._finger.put(self._start, np.zeros(3))
-        return replace(felt, forces=np.array(self._trace))
+        return replace(felt, forces=np.array(self._trace), deepest=self.deepest)
 
     def _drive(self, depth: float) -> list[TipContact]:
         """A step with the target at a depth; what the tip touched before it."""

@@ -175,7 +175,8 @@ class PlanarProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
         self.action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
         self.render_mode = render_mode
         self._window = Window("palpate/ProbePlanar-v0") if render_mode == "human" else None
-        self._truth: tuple[Polygon, RigidTransform] | None = None
+        # The pose as a matrix: SciPy normalises a pickled one anew, which changes its last bits.
+        self._truth: tuple[Polygon, NDArray[np.float64]] | None = None
         self._contacts = Contacts.none(2)
         self._touches: list[PlanarTouch] = []
         self._belief: Belief | None = None
@@ -202,7 +203,7 @@ class PlanarProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
         super().reset(seed=seed)
         drawn = self.library[int(self.np_random.integers(len(self.library)))]
         outline = self.library[self._index[self._object_name or drawn.name]]
-        self._truth = outline, self._draw_pose(outline)
+        self._truth = outline, self._draw_pose(outline).as_matrix()
         self._contacts = Contacts.none(2)
         self._touches = []
         self._belief = None
@@ -259,7 +260,8 @@ class PlanarProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
     def _placed(self) -> tuple[Polygon, RigidTransform]:
         if self._truth is None:
             raise gymnasium.error.ResetNeeded("call reset first")
-        return self._truth
+        outline, matrix = self._truth
+        return outline, RigidTransform(matrix, normalize=False)
 
     def _draw_pose(self, outline: Polygon) -> RigidTransform:
         """A pose, model to world, uniform in angle and offset."""

@@ -29,7 +29,7 @@ from .library import LibrarySource, load_library
 from .noise import Distribution, SensorNoise
 from .observation import Observation, ObservationLayout
 from .placement import make_placement
-from .scene import ProbeScene
+from .scene import ProbeScene, check_size
 from .sensors import make_sensors
 from .touch import ProbeCommand, Sensor, Touch
 
@@ -171,10 +171,11 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
         """See the class for the arguments.
 
         Raises:
-            ValueError: an unknown object, placement or sensor, a library that can't be loaded, a
-                bound that isn't positive, a radius or a force that the sensor or the objects don't
-                allow, an object that is free but doesn't stand, or a mass or friction of one that
-                isn't free, or fewer than one probe or hypothesis.
+            ValueError: an unknown object, placement or sensor, a library that can't be loaded, an
+                object of less than a millimetre or more than ten metres, a bound that isn't
+                positive, a radius or a force that the sensor or the objects don't allow, an object
+                that is free but doesn't stand, or a mass or friction of one that isn't free, or
+                fewer than one probe or hypothesis.
         """
         for name, value in (("max_probes", max_probes), ("hypotheses_shown", hypotheses_shown)):
             if value < 1:
@@ -183,6 +184,8 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
             position_error=position_error, normal_error=normal_error, distribution=distribution
         )
         self.library = load_library(library)
+        for model in self.library:
+            check_size(model)
         self._index = {model.name: row for row, model in enumerate(self.library)}
         if object_name is not None and object_name not in self._index:
             known = ", ".join(self._index)

@@ -64,6 +64,19 @@ class RayReadings:
     """(r, 3) outward unit normals there; zero for NOTHING."""
 
 
+def check_size(model: Polyhedron) -> None:
+    """Refuse an object that can't be simulated.
+
+    Raises:
+        ValueError: it is too large or too small to be simulated faithfully.
+    """
+    if not SMALLEST_DIAMETER <= model.diameter <= LARGEST_DIAMETER:
+        raise ValueError(
+            f"{model.name}: its diameter is {model.diameter:g} m; the simulation takes objects"
+            f" from {SMALLEST_DIAMETER:g} to {LARGEST_DIAMETER:g} m. Are the units metres?"
+        )
+
+
 class ProbeScene:
     """One object and the support plane, in MuJoCo."""
 
@@ -85,17 +98,21 @@ class ProbeScene:
             ValueError: the object is too large or too small to be simulated faithfully, or is to
                 move and its convex parts are not known.
         """
-        if not SMALLEST_DIAMETER <= model.diameter <= LARGEST_DIAMETER:
-            raise ValueError(
-                f"{model.name}: its diameter is {model.diameter:g} m; the simulation takes objects"
-                f" from {SMALLEST_DIAMETER:g} to {LARGEST_DIAMETER:g} m. Are the units metres?"
-            )
+        check_size(model)
         self.model = model
         self.position_rounding = MESH_ROUNDING * model.diameter
         """How far off single precision puts the object's surface, metres."""
         self.T_world_object = RigidTransform.identity()
         self._collision, self._free = collision, free
         self._compile(self.collision.parts if free else (), None)
+
+    def __getstate__(self) -> dict[str, Any]:
+        # SciPy normalises a pickled pose anew, which changes its last bits.
+        return {**self.__dict__, "T_world_object": self.T_world_object.as_matrix()}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        pose = RigidTransform(state["T_world_object"], normalize=False)
+        self.__dict__.update(state, T_world_object=pose)
 
     @cached_property
     def collision(self) -> CollisionParts:
@@ -209,6 +226,9 @@ class ProbeScene:
     def _compile(self, parts: Sequence[ConvexPart], finger: FingerDesign | None) -> None:
         spec = mujoco.MjSpec()
         body = spec.worldbody.add_body(name="object")
+        if self._free is None:
+            # It never moves; of the smallest and thinnest, MuJoCo finds no inertia of its own.
+            body.explicitinertial, body.mass, body.inertia = True, 1.0, np.ones(3)
         centroid = self.model.centroid
         vertices = self.model.vertices - centroid
         _add_mesh(spec, body, "object", vertices, self.model.triangles, collides=False)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,6 +63,10 @@ class Hypothesis:
     squares of its best interpretation, with half a turn and half a diameter known beforehand."""
     proven: bool = True
     """Whether ``pose`` meets every bound; if not, no such pose was found and none excluded."""
+
+    def __getstate__(self) -> dict[str, Any]:
+        # SciPy normalises a pickled pose anew, which changes its last bits; it is made again.
+        return {name: value for name, value in self.__dict__.items() if name != "pose"}
 
     @cached_property
     def pose(self) -> RigidTransform:
