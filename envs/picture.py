@@ -1,17 +1,11 @@
-"""A still picture of a probing episode: the object, the finger's rays, what it felt, the rivals.
+"""A picture of a probing episode: the object, the finger's rays, what it felt, the rivals.
 
-`draw` asks MuJoCo's offscreen renderer first, in a process of its own, because a missing or broken
-GL library may kill the process that tries it; matplotlib draws the same scene where that fails.
 All lengths are metres, all coordinates are in the world frame, z points up.
 """
 
 from __future__ import annotations
 
-import ctypes.util
 import os
-import subprocess
-import sys
-import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -22,10 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 if TYPE_CHECKING:
     from PIL.Image import Image
 
-__all__ = ["Ghost", "PictureScene", "draw", "renderer_note"]
-
-GL_SECONDS = 20.0
-"""A renderer that has not answered by then is given up: software GL needs about two."""
+__all__ = ["Ghost", "PictureScene", "Tip", "draw", "renderer_note"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,15 +27,32 @@ class Ghost:
         vertices_world: ``(v, 3)`` float64.
         triangles: ``(t, 3)`` int64 indices, counter-clockwise seen from outside.
         label: its line in the legend; ghosts of one label share a line and a colour.
+        colour: the number of its colour; None takes one that follows from the labels.
+        opacity: 1 for a ghost as plain as ghosts are, less for one that fades.
     """
 
     vertices_world: NDArray[np.float64]
     triangles: NDArray[np.int64]
     label: str
+    colour: int | None = None
+    opacity: float = 1.0
 
     def __post_init__(self) -> None:
         _coerce(self, "vertices_world", np.float64, (3,))
         _coerce(self, "triangles", np.int64, (3,))
+
+
+@dataclass(frozen=True, eq=False)
+class Tip:
+    """A finger's tip under way.
+
+    Attributes:
+        path_world: ``(2, 3)`` where the path that is shown begins, and where the tip's centre is.
+        radius: of a ball, metres; 0 for a point.
+    """
+
+    path_world: NDArray[np.float64]
+    radius: float
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -58,8 +66,10 @@ class PictureScene:
         rays_world: ``(r, 2, 3)`` start and end of each ray that the finger took.
         ray_hits: ``(r,)`` bool, whether the ray ended on the object.
         contacts_world: ``(n, 3)`` measured positions.
-        normals_world: ``(n, 3)`` measured outward unit normals.
+        normals_world: ``(n, 3)`` measured outward unit normals. A shorter one has a shorter arrow,
+            one of zero has none.
         ghosts: the rivals, drawn translucent.
+        tips: fingers under way.
         plane_height: z of the support plane. The object may reach below it.
         title: one line, large.
         subtitle: one line below it.
@@ -76,6 +86,7 @@ class PictureScene:
     contacts_world: NDArray[np.float64]
     normals_world: NDArray[np.float64]
     ghosts: tuple[Ghost, ...] = ()
+    tips: tuple[Tip, ...] = ()
     plane_height: float = 0.0
     title: str = ""
     subtitle: str = ""
@@ -109,15 +120,15 @@ def draw(scene: PictureScene, path: str | Path, size: tuple[int, int] = (1280, 9
     """
     path = Path(path)
     check_path(path)
-    from .picture_caption import add_caption
+    from .picture_caption import add_caption, caption_of
+    from .picture_view import Stage
+    from .renderer import Renderer
 
-    image, renderer = _draw_with_gl(scene, size), "MuJoCo"
-    if image is None:
-        from .picture_plot import draw_plot
-
-        image, renderer = draw_plot(scene, size), "matplotlib"
-    _save_whole(add_caption(image, scene), path)
-    return renderer
+    stage = Stage.of(scene, size)
+    with Renderer() as renderer:
+        image = renderer.draw(scene, stage, size)
+        _save_whole(add_caption(image, caption_of(scene, stage)), path)
+        return renderer.name
 
 
 def check_path(path: Path) -> None:
@@ -128,66 +139,11 @@ def check_path(path: Path) -> None:
         raise ValueError(f"the picture {str(path)!r} cannot be written: its folder does not exist")
 
 
-def renderer_note(renderer: str) -> str:
+def renderer_note(renderer: str, what: str = "picture") -> str:
     """What a command should tell about `draw`'s answer; empty where there is nothing to tell."""
     if renderer == "MuJoCo":
         return ""
-    return f"no GL library was found that works: the picture was drawn by {renderer}"
-
-
-def save_scene(scene: PictureScene, path: Path) -> None:
-    """Write ``scene`` as an ``.npz`` that `load_scene` reads."""
-    fields = {name: getattr(scene, name) for name in scene.__dataclass_fields__ if name != "ghosts"}
-    for i, ghost in enumerate(scene.ghosts):
-        fields[f"ghost_{i}_vertices"] = ghost.vertices_world
-        fields[f"ghost_{i}_triangles"] = ghost.triangles
-    np.savez(path, labels=np.array([g.label for g in scene.ghosts], dtype=np.str_), **fields)
-
-
-def load_scene(path: Path) -> PictureScene:
-    """Read what `save_scene` wrote."""
-    with np.load(path, allow_pickle=False) as file:
-        ghosts = tuple(
-            Ghost(file[f"ghost_{i}_vertices"], file[f"ghost_{i}_triangles"], str(label))
-            for i, label in enumerate(file["labels"])
-        )
-        arrays = {name: file[name] for name in PictureScene.__dataclass_fields__ if name in file}
-    for name, kind in (("plane_height", float), ("title", str), ("subtitle", str)):
-        arrays[name] = kind(arrays[name])
-    return PictureScene(**arrays, ghosts=ghosts)
-
-
-def _draw_with_gl(scene: PictureScene, size: tuple[int, int]) -> Image | None:
-    """The picture without its captions, or None where no GL library draws it."""
-    from PIL import Image
-
-    with tempfile.TemporaryDirectory(prefix="palpate-") as folder:
-        scene_path, image_path = Path(folder, "scene.npz"), Path(folder, "image.png")
-        save_scene(scene, scene_path)
-        # -P: the folder that the user happens to stand in must not hide a module.
-        command = [sys.executable, "-P", "-m", "palpate.envs.picture_gl"]
-        command += [str(scene_path), str(image_path), *map(str, size)]
-        for environment in _gl_environments():
-            try:
-                subprocess.run(
-                    command, env=environment, capture_output=True, timeout=GL_SECONDS, check=True
-                )
-                with Image.open(image_path) as image:
-                    return image.convert("RGB")
-            except (subprocess.SubprocessError, OSError):
-                continue
-    return None
-
-
-def _gl_environments() -> list[dict[str, str]]:
-    """The environments to try MuJoCo's renderer in, best first."""
-    if os.environ.get("MUJOCO_GL") or sys.platform != "linux":
-        return [dict(os.environ)]
-    names = [("egl", "EGL"), ("osmesa", "OSMesa")]
-    found = [name for name, library in names if ctypes.util.find_library(library)]
-    if os.environ.get("DISPLAY"):
-        found.append("glfw")
-    return [{**os.environ, "MUJOCO_GL": name} for name in found]
+    return f"no GL library was found that works: the {what} was drawn by {renderer}"
 
 
 def _save_whole(image: Image, path: Path) -> None:

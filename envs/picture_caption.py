@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import matplotlib
+import numpy as np
+from numpy.typing import NDArray
 from PIL import Image as ImageLib
 from PIL import ImageDraw, ImageFont
 from PIL.Image import Image
@@ -17,32 +23,59 @@ from .picture_view import (
     RAY_HIT,
     RAY_MISSED,
     Colour,
-    frame,
+    Stage,
     ghost_colours,
-    grid,
 )
 
-__all__ = ["add_caption"]
+if TYPE_CHECKING:
+    from ..recognizer import Belief
+
+__all__ = ["Caption", "add_caption", "belief_text", "caption_of", "length_text"]
+
+Entry = tuple[Colour, str]
 
 INK = (30, 42, 51)
 PALE_INK = (92, 102, 110)
 MOST_LABELS = 5
 
 
-def add_caption(image: Image, scene: PictureScene) -> Image:
-    """A copy of ``image`` with the scene's title, subtitle and legend."""
-    unit = image.height / 960  # sizes below are for 960 pixels of height
+@dataclass(frozen=True)
+class Caption:
+    """What is written onto a picture.
+
+    Attributes:
+        title: one line, large.
+        subtitle: one line below it.
+        legend: colour and text of each entry, a tuple a row; a row that is too long goes on below.
+        scale: of all letters, 1 for a picture of 960 lines that is looked at closely.
+    """
+
+    title: str
+    subtitle: str
+    legend: tuple[tuple[Entry, ...], ...]
+    scale: float = 1.0
+
+
+def caption_of(scene: PictureScene, stage: Stage) -> Caption:
+    """The caption of a scene that is looked at by itself."""
+    return Caption(scene.title, scene.subtitle, (tuple(_legend(scene, stage.step)),))
+
+
+def add_caption(picture: NDArray[np.uint8], caption: Caption) -> Image:
+    """A picture, ``(h, w, 3)``, with its caption."""
+    image = ImageLib.fromarray(picture)
+    unit = caption.scale * image.height / 960  # sizes below are for 960 pixels of height
     margin = 36 * unit
     room = image.width - 2 * margin
     font = _font(17 * unit)
-    _, step = grid(scene, frame(scene, image.size))
-    rows = _rows(_legend(scene, step), font, room, unit)
+    rows = [row for entries in caption.legend for row in _rows(entries, font, room, unit)]
 
     image = _with_bands(image, 106 * unit, (24 + 30 * len(rows)) * unit)
     canvas = ImageDraw.Draw(image)
-    canvas.text((margin, 26 * unit), scene.title, INK, _fitting(scene.title, 30 * unit, room, True))
-    subtitle = _fitting(scene.subtitle, 20 * unit, room)
-    canvas.text((margin, 66 * unit), scene.subtitle, PALE_INK, subtitle)
+    title = _fitting(caption.title, 30 * unit, room, True)
+    canvas.text((margin, 26 * unit), caption.title, INK, title)
+    subtitle = _fitting(caption.subtitle, 20 * unit, room)
+    canvas.text((margin, 66 * unit), caption.subtitle, PALE_INK, subtitle)
 
     y = image.height - (27 + 30 * (len(rows) - 1)) * unit
     for row in rows:
@@ -65,7 +98,7 @@ def _with_bands(image: Image, top: float, bottom: float) -> Image:
     return ImageLib.composite(ImageLib.new("RGB", image.size, "white"), image.convert("RGB"), veil)
 
 
-def _legend(scene: PictureScene, step: float) -> list[tuple[Colour, str]]:
+def _legend(scene: PictureScene, step: float) -> list[Entry]:
     """Colour and text of each entry; only what is in the scene."""
     entries = [(OBJECT, "the object as it lies")]
     if len(scene.contacts_world):
@@ -78,14 +111,31 @@ def _legend(scene: PictureScene, step: float) -> list[tuple[Colour, str]]:
     entries += ghosts[:MOST_LABELS]
     if len(ghosts) > MOST_LABELS:
         entries.append((GRID, f"and {len(ghosts) - MOST_LABELS} more"))
-    return [*entries, (GRID, f"grid {_length(step)}")]
+    return [*entries, (GRID, f"grid {length_text(step)}")]
+
+
+def belief_text(belief: Belief | None) -> str:
+    """What is left, in one line."""
+    if belief is None:
+        return "Nothing touched yet"
+    left = len(belief.hypotheses)
+    if not left:
+        return "No hypothesis left: not in the library"
+    if left == 1:
+        only = belief.hypotheses[0]
+        return f"1 hypothesis left: {only.object_name}" + (
+            "" if only.determined else ", its pose still open"
+        )
+    counts = Counter(hypothesis.object_name for hypothesis in belief.hypotheses)
+    named = [f"{name} {count}" for name, count in counts.most_common(4)]
+    return f"{left} hypotheses left: {', '.join(named + ['…'] * (len(counts) > 4))}"
 
 
 def _rows(
-    entries: list[tuple[Colour, str]], font: ImageFont.FreeTypeFont, room: float, unit: float
-) -> list[list[tuple[Colour, str]]]:
+    entries: tuple[Entry, ...], font: ImageFont.FreeTypeFont, room: float, unit: float
+) -> list[list[Entry]]:
     """The entries in as many rows as they need."""
-    rows: list[list[tuple[Colour, str]]] = [[]]
+    rows: list[list[Entry]] = [[]]
     used = 0.0
     for colour, text in entries:
         width = 58 * unit + font.getlength(text)
@@ -97,7 +147,8 @@ def _rows(
     return rows
 
 
-def _length(metres: float) -> str:
+def length_text(metres: float) -> str:
+    """A length in the unit that suits it."""
     for unit, name in ((1.0, "m"), (1e-2, "cm"), (1e-3, "mm")):
         if metres > 0.999 * unit:
             return f"{metres / unit:.3g} {name}"
@@ -111,6 +162,7 @@ def _fitting(text: str, size: float, room: float, bold: bool = False) -> ImageFo
     return font if length <= room else _font(size * room / length, bold)
 
 
+@cache
 def _font(size: float, bold: bool = False) -> ImageFont.FreeTypeFont:
     name = "DejaVuSans-Bold.ttf" if bold else "DejaVuSans.ttf"
     path = Path(matplotlib.get_data_path(), "fonts", "ttf", name)

@@ -1,13 +1,13 @@
-"""The picture by MuJoCo's offscreen renderer: ``python -m palpate.envs.picture_gl``.
+"""Pictures by MuJoCo's offscreen renderer: ``python -m palpate.envs.picture_gl``.
 
-A process of its own, started by `picture.draw`: where GL is missing or broken, only this dies.
+A process of its own, started by `renderer.Renderer`: where GL is missing or broken, only this dies.
 ``MUJOCO_GL`` must be set before the process starts.
 """
 
 from __future__ import annotations
 
 import sys
-from pathlib import Path
+from multiprocessing.connection import Connection
 
 import mujoco
 import numpy as np
@@ -15,28 +15,66 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from . import picture_view as look
-from .picture import PictureScene, load_scene
+from .picture import PictureScene, Tip
 
-__all__ = ["render"]
+__all__ = ["GlPainter", "serve"]
 
 OVERSAMPLING = 2  # software GL may not smooth edges itself
+ROUNDNESS = 12, 6  # of lines and balls, which are small; more costs more than all else
 MOST_SHAPES = 20_000
+GHOST_OPACITY = 0.18
 Floats = NDArray[np.float64]
+Size = tuple[int, int]
 
 
-def render(scene: PictureScene, size: tuple[int, int]) -> NDArray[np.uint8]:
-    """The picture without captions, ``(height, width, 3)``; twice ``size``, for smooth edges."""
-    view = look.frame(scene, size)
-    width, height = (OVERSAMPLING * n for n in size)
-    model = _compile(scene, view, width, height)
-    data = mujoco.MjData(model)
-    mujoco.mj_forward(model, data)
-    with mujoco.Renderer(model, height, width, max_geom=MOST_SHAPES) as renderer:
-        renderer.update_scene(data, _camera(view))
-        renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = False
-        renderer.scene.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = False
-        _add_shapes(renderer.scene, scene, view)
-        return renderer.render()
+def serve(connection: Connection) -> None:
+    """Paint what comes in until the other end hangs up.
+
+    Takes (scene, stage, size) and answers with the picture's bytes, ``(height, width, 3)``; says
+    "ready" first.
+    """
+    connection.send("ready")
+    painter = GlPainter()
+    while True:
+        try:
+            scene, stage, size = connection.recv()
+        except EOFError:
+            return
+        connection.send_bytes(painter.paint(scene, stage, size).tobytes())
+
+
+class GlPainter:
+    """Paints scene after scene; what only moves or fades costs no new set-up."""
+
+    def __init__(self) -> None:
+        self._key: bytes | None = None
+
+    def paint(self, scene: PictureScene, stage: look.Stage, size: Size) -> NDArray[np.uint8]:
+        """The picture without captions, ``(height, width, 3)``."""
+        key = look.mesh_key(scene, stage.view, size)
+        if key != self._key:
+            self._set_up(scene, stage.view, size)
+            self._key = key
+        colours = look.ghost_colours(scene)
+        for i, ghost in enumerate(scene.ghosts):
+            colour = (*colours[ghost.label], GHOST_OPACITY * ghost.opacity)
+            self._model.geom(f"ghost {i}").rgba[:] = colour
+        self._renderer.update_scene(self._data, _camera(stage.view))
+        target = self._renderer.scene
+        target.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = False
+        target.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = False
+        _add_shapes(target, scene, stage)
+        return np.asarray(Image.fromarray(self._renderer.render()).reduce(OVERSAMPLING))
+
+    def _set_up(self, scene: PictureScene, view: look.View, size: Size) -> None:
+        if self._key is not None:
+            self._renderer.close()
+            self._key = None
+        width, height = (OVERSAMPLING * n for n in size)
+        self._model = _compile(scene, view, width, height)
+        self._data = mujoco.MjData(self._model)
+        mujoco.mj_forward(self._model, self._data)
+        self._renderer = mujoco.Renderer(self._model, height, width, max_geom=MOST_SHAPES)
 
 
 def _compile(scene: PictureScene, view: look.View, width: int, height: int) -> mujoco.MjModel:
@@ -44,6 +82,8 @@ def _compile(scene: PictureScene, view: look.View, width: int, height: int) -> m
     spec = mujoco.MjSpec()
     spec.visual.global_.offwidth, spec.visual.global_.offheight = width, height
     spec.visual.global_.fovy = float(np.degrees(look.FIELD_OF_VIEW))
+    spec.visual.quality.offsamples = 0  # oversampled already
+    spec.visual.quality.numslices, spec.visual.quality.numstacks = ROUNDNESS
     spec.visual.headlight.ambient[:] = 0.52
     spec.visual.headlight.diffuse[:] = 0.16
     spec.visual.headlight.specular[:] = 0.0
@@ -65,21 +105,16 @@ def _compile(scene: PictureScene, view: look.View, width: int, height: int) -> m
         specular=[0.05, 0.05, 0.05],
         castshadow=False,
     )
-    _add_mesh(spec, "object", scene.object_vertices_world, scene.object_triangles, look.OBJECT, 1.0)
-    colours = look.ghost_colours(scene)
+    _add_mesh(spec, "object", scene.object_vertices_world, scene.object_triangles)
     for i, ghost in enumerate(scene.ghosts):
-        colour = colours[ghost.label]
-        _add_mesh(spec, f"ghost {i}", ghost.vertices_world, ghost.triangles, colour, 0.18)
-    return spec.compile()
+        _add_mesh(spec, f"ghost {i}", ghost.vertices_world, ghost.triangles)
+    model = spec.compile()
+    model.geom("object").rgba[:] = (*look.OBJECT, 1.0)
+    return model
 
 
 def _add_mesh(
-    spec: mujoco.MjSpec,
-    name: str,
-    vertices: Floats,
-    triangles: NDArray[np.int64],
-    colour: look.Colour,
-    alpha: float,
+    spec: mujoco.MjSpec, name: str, vertices: Floats, triangles: NDArray[np.int64]
 ) -> None:
     corners = vertices[triangles]
     faces = list(range(3 * len(triangles)))
@@ -95,11 +130,7 @@ def _add_mesh(
         inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,  # a mesh needs no volume to be drawn
     )
     spec.worldbody.add_geom(
-        type=mujoco.mjtGeom.mjGEOM_MESH,
-        meshname=name,
-        rgba=[*colour, alpha],
-        contype=0,
-        conaffinity=0,
+        name=name, type=mujoco.mjtGeom.mjGEOM_MESH, meshname=name, contype=0, conaffinity=0
     )
 
 
@@ -113,29 +144,40 @@ def _camera(view: look.View) -> mujoco.MjvCamera:
     return camera
 
 
-def _add_shapes(target: mujoco.MjvScene, scene: PictureScene, view: look.View) -> None:
-    unit = view.radius
-    lines, _ = look.grid(scene, view)
-    _add_plane(target, lines, 0.0005 * unit)
-    for line in lines:
+def _add_shapes(target: mujoco.MjvScene, scene: PictureScene, stage: look.Stage) -> None:
+    unit, size = stage.view.radius, look.mark_size(scene)
+    _add_plane(target, stage.ruled, 0.0005 * unit)
+    for line in stage.ruled:
         _add_line(target, line, 0.0015 * unit, look.GRID)
     for edge in scene.object_edges_world:
         _add_line(target, edge, 0.0035 * unit, look.EDGE)
     colours = look.ghost_colours(scene)
     for ghost in scene.ghosts:
+        colour = colours[ghost.label]
         for edge in look.sharp_edges(ghost.vertices_world, ghost.triangles):
-            _add_line(target, edge, 0.0025 * unit, colours[ghost.label])
-    for ray, hit in zip(look.shown_rays(scene, view), scene.ray_hits, strict=True):
+            _add_line(target, edge, 0.0025 * unit, colour, alpha=ghost.opacity)
+    for ray, hit in zip(look.shown_rays(scene, stage.view), scene.ray_hits, strict=True):
         colour = look.RAY_HIT if hit else look.RAY_MISSED
         _add_line(target, ray, (0.0045 if hit else 0.003) * unit, colour)
         if not hit:
             _add_ball(target, ray[1], 0.012 * unit, colour)
+    for tip in scene.tips:
+        _add_tip(target, tip, unit)
     for contact, normal in zip(scene.contacts_world, scene.normals_world, strict=True):
-        _add_ball(target, contact, 0.024 * unit, look.CONTACT)
-        # Twice the length, because MuJoCo draws an arrow to half of where it says that it ends.
-        tip = contact + 2 * look.NORMAL_LENGTH * unit * normal
-        arrow = mujoco.mjtGeom.mjGEOM_ARROW
-        _add_line(target, np.stack([contact, tip]), 0.010 * unit, look.CONTACT, arrow)
+        _add_ball(target, contact, 0.024 * size * unit, look.CONTACT)
+        if normal.any():
+            # Twice the length: MuJoCo draws an arrow to half of where it says that it ends.
+            end = contact + 2 * look.NORMAL_LENGTH * size * unit * normal
+            arrow = mujoco.mjtGeom.mjGEOM_ARROW
+            _add_line(target, np.stack([contact, end]), 0.010 * size * unit, look.CONTACT, arrow)
+
+
+def _add_tip(target: mujoco.MjvScene, tip: Tip, unit: float) -> None:
+    """A ball and what it sweeps; of a point its line, and a dot that can be seen."""
+    _add_line(target, tip.path_world, 0.0045 * unit, look.RAY_HIT)
+    if tip.radius > 0.0:
+        _add_line(target, tip.path_world, tip.radius, look.RAY_HIT, alpha=0.25)
+    _add_ball(target, tip.path_world[1], tip.radius or look.POINT_SIZE * unit, look.RAY_HIT)
 
 
 def _add_plane(target: mujoco.MjvScene, lines: Floats, thickness: float) -> None:
@@ -154,8 +196,9 @@ def _add_line(
     radius: float,
     colour: look.Colour,
     kind: mujoco.mjtGeom = mujoco.mjtGeom.mjGEOM_CAPSULE,
+    alpha: float = 1.0,
 ) -> None:
-    geom = _add(target, kind, np.ones(3), np.zeros(3), colour)
+    geom = _add(target, kind, np.ones(3), np.zeros(3), colour, alpha)
     mujoco.mjv_connector(geom, kind, radius, ends[0], ends[1])
 
 
@@ -176,6 +219,4 @@ def _add(
 
 
 if __name__ == "__main__":
-    scene_path, image_path, *wanted = sys.argv[1:]
-    pixels = render(load_scene(Path(scene_path)), (int(wanted[0]), int(wanted[1])))
-    Image.fromarray(pixels).reduce(OVERSAMPLING).save(image_path)
+    serve(Connection(int(sys.argv[1])))

@@ -7,7 +7,7 @@ takes on its colour.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -17,15 +17,16 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from . import picture_view as look
-from .picture import PictureScene
+from .picture import PictureScene, Tip
 from .picture_raster import Layer, blend, see, see_faces
 
-__all__ = ["draw_plot"]
+__all__ = ["PlotPainter"]
 
 OVERSAMPLING = 2
 DPI = 72  # one point is one pixel
 PIECE = 1 / 30  # of the scene's radius: how exactly a line ends where a face hides it
 BACKGROUND = 0.955
+GHOST_OPACITY, PLANE_OPACITY = 0.28, 0.6
 Floats = NDArray[np.float64]
 
 
@@ -39,53 +40,75 @@ class Marks:
         width: of lines, metres; 0 for filled marks.
         nearer: how far towards the camera they count as, metres, so that the face that they lie on
             does not hide them.
+        opacity: below 1 for marks that fade.
     """
 
     corners: Floats
     colour: look.Colour
     width: float
     nearer: float
+    opacity: float = 1.0
 
 
-def draw_plot(scene: PictureScene, size: tuple[int, int]) -> Image.Image:
-    """The picture without captions, ``size`` (width, height) pixels."""
-    view = look.frame(scene, size)
-    large = OVERSAMPLING * size[0], OVERSAMPLING * size[1]
-    solid = scene.object_vertices_world[scene.object_triangles]
-    opaque = see_faces(solid, look.OBJECT, 1.0, view, large)
-    plane = _see_plane(scene, view, large)
-    ghosts = _see_ghosts(scene, view, large)
+class PlotPainter:
+    """Paints scene after scene; faces that stay as they are, are looked at once."""
 
-    figure = Figure(figsize=(large[0] / DPI, large[1] / DPI), dpi=DPI)
-    canvas = FigureCanvasAgg(figure)
-    axes = figure.add_axes((0, 0, 1, 1))
-    axes.set_axis_off()
-    under = _faces_picture(opaque, plane, ghosts)
-    axes.imshow(under, extent=(0, large[0], large[1], 0), interpolation="none", aspect="auto")
-    axes.add_collection(
-        _painted(_marks(scene, view), opaque, [plane, *ghosts], view), autolim=False
-    )
-    canvas.draw()
-    return Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB").reduce(OVERSAMPLING)
+    def __init__(self) -> None:
+        self._layers: dict[bytes, Layer] = {}
+        self._key = b""
+
+    def paint(
+        self, scene: PictureScene, stage: look.Stage, size: tuple[int, int]
+    ) -> NDArray[np.uint8]:
+        """The picture without captions, ``(height, width, 3)``; ``size`` is (width, height)."""
+        self._look(scene, stage, size)
+        figure = Figure(figsize=(size[0] / DPI, size[1] / DPI), dpi=DPI)
+        canvas = FigureCanvasAgg(figure)
+        figure.figimage(self._faces, origin="upper", zorder=-1)
+        axes = figure.add_axes((0, 0, 1, 1))
+        axes.set_axis_off()
+        axes.set(xlim=(0, size[0]), ylim=(size[1], 0))
+        marks = _painted(_marks(scene, stage), self._opaque, self._translucent, stage.view)
+        axes.add_collection(marks, autolim=False)
+        canvas.draw()
+        return np.array(canvas.buffer_rgba())[..., :3]
+
+    def _look(self, scene: PictureScene, stage: look.Stage, size: tuple[int, int]) -> None:
+        """Have the faces of a scene as the camera sees them."""
+        opacities = np.array([ghost.opacity for ghost in scene.ghosts])
+        key = look.mesh_key(scene, stage.view, size) + opacities.tobytes()
+        if key == self._key:
+            return
+        large = OVERSAMPLING * size[0], OVERSAMPLING * size[1]
+        kept, self._layers = self._layers, {}
+
+        def see_once(triangles: Floats, colour: look.Colour) -> Layer:
+            facts = np.array([*stage.view.numbers, *large, *colour])
+            name = facts.tobytes() + triangles.tobytes()
+            layer = kept.get(name) or see_faces(triangles, colour, 1.0, stage.view, large)
+            self._layers[name] = layer
+            return layer
+
+        colours = look.ghost_colours(scene)
+        ghosts = [
+            replace(
+                see_once(ghost.vertices_world[ghost.triangles], colours[ghost.label]),
+                alpha=GHOST_OPACITY * ghost.opacity,
+            )
+            for ghost in scene.ghosts
+        ]
+        plane = _see_plane(stage, large)
+        self._opaque = see_once(scene.object_vertices_world[scene.object_triangles], look.OBJECT)
+        self._translucent = [plane, *ghosts]
+        self._faces = _faces_picture(self._opaque, plane, ghosts)
+        self._key = key
 
 
-def _see_plane(scene: PictureScene, view: look.View, size: tuple[int, int]) -> Layer:
-    ruled, _ = look.grid(scene, view)
-    (x0, y0, z), (x1, y1, _) = ruled.min(axis=(0, 1)), ruled.max(axis=(0, 1))
+def _see_plane(stage: look.Stage, size: tuple[int, int]) -> Layer:
+    (x0, y0, z), (x1, y1, _) = stage.ruled.min(axis=(0, 1)), stage.ruled.max(axis=(0, 1))
     a, b, c, d = (x0, y0, z), (x1, y0, z), (x1, y1, z), (x0, y1, z)
-    return see(np.array([[a, b, c], [a, c, d]]), np.ones(2), look.PLANE, 0.6, view, size)
-
-
-def _see_ghosts(scene: PictureScene, view: look.View, size: tuple[int, int]) -> list[Layer]:
-    """A layer for each label."""
-    corners: dict[str, list[Floats]] = {}
-    for ghost in scene.ghosts:
-        corners.setdefault(ghost.label, []).append(ghost.vertices_world[ghost.triangles])
-    colours = look.ghost_colours(scene)
-    return [
-        see_faces(np.concatenate(triangles), colours[label], 0.28, view, size)
-        for label, triangles in corners.items()
-    ]
+    corners = np.array([[a, b, c], [a, c, d]])
+    return see(corners, np.ones(2), look.PLANE, PLANE_OPACITY, stage.view, size)
 
 
 def _faces_picture(opaque: Layer, plane: Layer, ghosts: list[Layer]) -> NDArray[np.uint8]:
@@ -99,30 +122,48 @@ def _faces_picture(opaque: Layer, plane: Layer, ghosts: list[Layer]) -> NDArray[
     for ghost in ghosts:
         seen = ghost.nearness > opaque.nearness
         blend(picture, ghost, seen & (ghost.nearness > plane.nearness))
-    return np.round(255 * picture).astype(np.uint8)
+    return np.asarray(
+        Image.fromarray(np.round(255 * picture).astype(np.uint8)).reduce(OVERSAMPLING)
+    )
 
 
-def _marks(scene: PictureScene, view: look.View) -> list[Marks]:
+def _marks(scene: PictureScene, stage: look.Stage) -> list[Marks]:
+    view, size = stage.view, look.mark_size(scene)
     unit = view.radius
     marks = [
-        _lines(look.grid(scene, view)[0], look.GRID, 0.0010, view, 0.002),
+        _lines(stage.ruled, look.GRID, 0.0010, view, 0.002),
         _lines(scene.object_edges_world, look.EDGE, 0.0035, view, 0.010),
     ]
     colours = look.ghost_colours(scene)
     for ghost in scene.ghosts:
         edges = look.sharp_edges(ghost.vertices_world, ghost.triangles)
-        marks.append(_lines(edges, colours[ghost.label], 0.0025, view, 0.010))
+        lines = _lines(edges, colours[ghost.label], 0.0025, view, 0.010)
+        marks.append(replace(lines, opacity=ghost.opacity))
     rays, hit = look.shown_rays(scene, view), scene.ray_hits
-    tips = scene.contacts_world + look.NORMAL_LENGTH * unit * scene.normals_world
-    shafts = np.stack([scene.contacts_world, 0.35 * scene.contacts_world + 0.65 * tips], axis=1)
+    arrows = scene.normals_world.any(axis=1)
+    starts = scene.contacts_world[arrows]
+    ends = starts + look.NORMAL_LENGTH * size * unit * scene.normals_world[arrows]
+    shafts = np.stack([starts, 0.35 * starts + 0.65 * ends], axis=1)
     return [
         *marks,
         _lines(rays[~hit], look.RAY_MISSED, 0.0030, view, 0.02),
         _discs(rays[~hit, 1], look.RAY_MISSED, 0.012, view),
         _lines(rays[hit], look.RAY_HIT, 0.0045, view, 0.02),
-        _lines(shafts, look.CONTACT, 0.009, view, 0.03),
-        _discs(scene.contacts_world, look.CONTACT, 0.022, view),
-        _arrow_heads(shafts[:, 1], tips, 0.022, view),
+        *(mark for tip in scene.tips for mark in _tip_marks(tip, view)),
+        _lines(shafts, look.CONTACT, 0.009 * size, view, 0.03),
+        _discs(scene.contacts_world, look.CONTACT, 0.022 * size, view),
+        _arrow_heads(shafts[:, 1], ends, 0.022 * size, view),
+    ]
+
+
+def _tip_marks(tip: Tip, view: look.View) -> list[Marks]:
+    """A ball and what it sweeps; of a point its line, and a dot that can be seen."""
+    path, radius = tip.path_world[None], tip.radius / view.radius
+    swept = _lines(path, look.RAY_HIT, max(radius, 0.0045), view, 0.02)
+    return [
+        replace(swept, opacity=0.25 if radius else 1.0),
+        _lines(path, look.RAY_HIT, 0.0045, view, 0.02),
+        _discs(path[:, 1], look.RAY_HIT, radius or look.POINT_SIZE, view),
     ]
 
 
@@ -166,21 +207,25 @@ def _painted(
         depth = middle[:, 2] - group.nearer
         x, y = np.clip(middle[:, :2], 0, (width - 1, height - 1)).astype(int).T
         visible = 1 / depth > opaque.nearness[y, x]
-        colour = np.tile(np.array(group.colour, np.float32), (len(corners), 1))
+        colour = np.tile(np.array([*group.colour, group.opacity], np.float32), (len(corners), 1))
         for layer in translucent:
             veiled = layer.nearness[y, x] > 1 / depth
-            colour[veiled] += layer.alpha * (layer.colour[y, x][veiled] - colour[veiled])
-        outlines += list(corners[visible][..., :2])
+            veil = layer.shaded((y[veiled], x[veiled]))
+            colour[veiled, :3] += layer.alpha * (veil - colour[veiled, :3])
+        outlines += list(corners[visible][..., :2] / OVERSAMPLING)
         depths.append(depth[visible])
         colours.append(colour[visible])
-        widths.append(np.full(visible.sum(), group.width * pixels_per_metre))
+        widths.append(np.full(visible.sum(), group.width * pixels_per_metre / OVERSAMPLING))
     order = np.argsort(-np.concatenate(depths), kind="stable")
-    line_widths, rgb = np.concatenate(widths)[order], np.concatenate(colours)[order]
-    filled = (line_widths == 0)[:, None]
+    line_widths, rgba = np.concatenate(widths)[order], np.concatenate(colours)[order]
+    filled = line_widths == 0
+    faces, strokes = rgba.copy(), rgba.copy()
+    faces[~filled, 3] = 0.0
+    strokes[filled, 3] = 0.0
     return PolyCollection(
         [outlines[i] for i in order],
-        facecolors=np.hstack([rgb, filled]),
-        edgecolors=np.hstack([rgb, ~filled]),
+        facecolors=faces,
+        edgecolors=strokes,
         linewidths=line_widths,
         capstyle="round",
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,13 +23,19 @@ class Layer:
 
     Attributes:
         nearness: ``(h, w)`` one over the depth, 1/metres; zero where there is nothing.
-        colour: ``(h, w, 3)`` in 0..1, shaded.
+        shade: ``(h, w)`` how bright it is there, 1 for its own colour.
+        colour: of all of it.
         alpha: one opacity for all of it.
     """
 
     nearness: Pixels
-    colour: Pixels
+    shade: Pixels
+    colour: look.Colour
     alpha: float
+
+    def shaded(self, where: tuple[NDArray[Any], ...] | NDArray[np.bool_]) -> Pixels:
+        """``(n, 3)`` its colour, shaded, in the chosen pixels."""
+        return np.minimum(self.shade[where][:, None] * np.array(self.colour, np.float32), 1.0)
 
 
 def see_faces(
@@ -60,13 +67,12 @@ def see(
     small, owner = _cut_small(triangles, PIECE * view.radius)
     for corners, brightness in zip(view.project(small, size), shades[owner], strict=True):
         _fill(corners, brightness, nearness, shade)
-    shaded = np.minimum(shade[..., None] * np.array(colour, np.float32), 1.0)
-    return Layer(nearness, shaded, alpha)
+    return Layer(nearness, shade, colour, alpha)
 
 
 def blend(under: Pixels, layer: Layer, where: NDArray[np.bool_]) -> None:
     """Paint ``layer`` over the picture ``under``, in place, where ``where`` says so."""
-    under[where] += np.float32(layer.alpha) * (layer.colour[where] - under[where])
+    under[where] += np.float32(layer.alpha) * (layer.shaded(where) - under[where])
 
 
 def _fill(corners: Floats, brightness: float, nearness: Pixels, shade: Pixels) -> None:

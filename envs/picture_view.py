@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -19,10 +19,13 @@ __all__ = [
     "PLANE",
     "RAY_HIT",
     "RAY_MISSED",
+    "Stage",
     "View",
     "frame",
     "ghost_colours",
     "grid",
+    "mark_size",
+    "mesh_key",
     "sharp_edges",
     "shown_rays",
 ]
@@ -50,6 +53,8 @@ FIELD_OF_VIEW = np.radians(28.0)  # vertical; narrow, so that parallel edges loo
 ELEVATION = np.radians(-30.0)
 FILLED_WIDTH, FILLED_HEIGHT = 0.86, 0.70  # the share of the picture left to the object by captions
 
+POINT_SIZE = 0.02  # radius of a dot that stands for a point, in the same units
+FEW_CONTACTS = 15  # up to which their marks have the full size
 NORMAL_LENGTH = 0.21  # of a normal's arrow, in units of the view's radius
 
 
@@ -71,6 +76,11 @@ class View:
     distance: float
     radius: float
 
+    @property
+    def numbers(self) -> Floats:
+        """``(6,)`` centre, azimuth, elevation, distance: all that decides what is seen."""
+        return np.array([*self.centre, self.azimuth, self.elevation, self.distance])
+
     @cached_property
     def axes(self) -> Floats:
         """``(3, 3)`` rows: right, up and towards the viewer, world frame."""
@@ -83,6 +93,41 @@ class View:
         depth = self.distance - back
         scale = height / 2 / np.tan(FIELD_OF_VIEW / 2) / depth
         return np.stack([width / 2 + right * scale, height / 2 - up * scale, depth], axis=-1)
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """What stays as it is from picture to picture: the camera and the ruled plane.
+
+    Attributes:
+        view: the camera.
+        ruled: ``(g, 2, 3)`` lines on the plane; see `grid`.
+        step: between the lines, metres.
+    """
+
+    view: View
+    ruled: Floats
+    step: float
+
+    @classmethod
+    def of(cls, scene: PictureScene, size: tuple[int, int], room: float = 1.0) -> Stage:
+        """The stage on which all of ``scene`` is seen.
+
+        Args:
+            scene: what is to be seen.
+            size: of the picture, (width, height) pixels.
+            room: how many times farther away the camera is than it must be.
+        """
+        view = frame(scene, size)
+        view = replace(view, distance=room * view.distance)
+        return cls(view, *grid(scene, view))
+
+    def holds(self, points_world: Floats, size: tuple[int, int]) -> bool:
+        """Whether all ``(n, 3)`` points are seen, clear of the captions."""
+        x, y, depth = self.view.project(points_world, size).T
+        wide, tall = (1 - FILLED_WIDTH) / 4 * size[0], (1 - FILLED_HEIGHT) / 4 * size[1]
+        inside = (x > wide) & (x < size[0] - wide) & (y > tall) & (y < size[1] - tall)
+        return bool((inside & (depth > 0)).all())
 
 
 def frame(scene: PictureScene, size: tuple[int, int]) -> View:
@@ -108,8 +153,24 @@ def frame(scene: PictureScene, size: tuple[int, int]) -> View:
 
 def ghost_colours(scene: PictureScene) -> dict[str, Colour]:
     """A colour for each label, in the order of the ghosts."""
-    labels = list(dict.fromkeys(ghost.label for ghost in scene.ghosts))
-    return {label: GHOSTS[i % len(GHOSTS)] for i, label in enumerate(labels)}
+    numbers: dict[str, int] = {}
+    for ghost in scene.ghosts:
+        numbers.setdefault(ghost.label, len(numbers) if ghost.colour is None else ghost.colour)
+    return {label: GHOSTS[number % len(GHOSTS)] for label, number in numbers.items()}
+
+
+def mesh_key(scene: PictureScene, view: View, size: tuple[int, int]) -> bytes:
+    """Differs where the meshes of a scene, their colours, the camera or the picture's size do."""
+    meshes = [(scene.object_vertices_world, scene.object_triangles)]
+    meshes += [(ghost.vertices_world, ghost.triangles) for ghost in scene.ghosts]
+    facts = np.array([*view.numbers, *size, *np.ravel([*ghost_colours(scene).values()])])
+    arrays = [facts, *(array for mesh in meshes for array in mesh)]
+    return b"".join(str(array.shape).encode() + array.tobytes() for array in arrays)
+
+
+def mark_size(scene: PictureScene) -> float:
+    """How large marks of contacts are drawn, 1 but where so many would hide all else."""
+    return float(np.clip(np.sqrt(FEW_CONTACTS / max(len(scene.contacts_world), 1)), 0.4, 1.0))
 
 
 def shown_rays(scene: PictureScene, view: View) -> Floats:

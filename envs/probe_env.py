@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import gymnasium
 import numpy as np
@@ -32,6 +32,9 @@ from .placement import make_placement
 from .scene import ProbeScene, check_size
 from .sensors import make_sensors
 from .touch import ProbeCommand, Sensor, Touch
+
+if TYPE_CHECKING:
+    from .episode_view import EpisodeView
 
 INCH = 0.0254
 HALF_WIDTH = 0.375
@@ -117,6 +120,12 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
     also `displacement`, what a tracker would tell: the largest `distance` (metres) by which a point
     of it was moved by the last probe, and the `turn` (radians).
 
+    ## Rendering
+    `rgb_array` gives a picture, (600, 800, 3): the object as it truly lies, the last probe's rays,
+    all contacts with the normals felt, and the leading rivals as ghosts. MuJoCo's renderer draws
+    it, in a process of its own that lives until `close`; where no GL library works, matplotlib
+    does. `human` shows it in a window after each step, by matplotlib's interactive backend.
+
     ## Arguments
     | name | default | meaning |
     |---|---|---|
@@ -137,6 +146,7 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
     | hypotheses_shown | 16 | hypotheses in the observation |
     | tolerance | None | which poses count as the same |
     | limits | None | how far the recogniser searches |
+    | render_mode | None | None, "rgb_array" or "human" |
 
     ## References
     W. E. L. Grimson and T. Lozano-Perez, MIT AI Memo 738, 1983, Section 4.4.
@@ -145,7 +155,10 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
     * v0: initial version.
     """
 
-    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012  Gymnasium's own declaration
+    metadata: dict[str, Any] = {  # noqa: RUF012  Gymnasium's own declaration
+        "render_modes": ["human", "rgb_array"],
+        "render_fps": 2,
+    }
 
     def __init__(
         self,
@@ -167,19 +180,23 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
         hypotheses_shown: int = 16,
         tolerance: PoseTolerance | None = None,
         limits: SearchLimits | None = None,
+        render_mode: str | None = None,
     ) -> None:
         """See the class for the arguments.
 
         Raises:
-            ValueError: an unknown object, placement or sensor, a library that can't be loaded, an
-                object of less than a millimetre or more than ten metres, a bound that isn't
-                positive, a radius or a force that the sensor or the objects don't allow, an object
-                that is free but doesn't stand, or a mass or friction of one that isn't free, or
-                fewer than one probe or hypothesis.
+            ValueError: an unknown object, placement, sensor or render mode, a library that can't be
+                loaded, an object of less than a millimetre or more than ten metres, a bound that
+                isn't positive, a radius or a force that the sensor or the objects don't allow, an
+                object that is free but doesn't stand, or a mass or friction of one that isn't free,
+                or fewer than one probe or hypothesis.
+            gymnasium.error.DependencyNotInstalled: render mode "human" where no window can open.
         """
         for name, value in (("max_probes", max_probes), ("hypotheses_shown", hypotheses_shown)):
             if value < 1:
                 raise ValueError(f"{name} is {value}; it must be at least 1")
+        self.render_mode = render_mode
+        self._view = None if render_mode is None else _view(render_mode)
         noise = SensorNoise(
             position_error=position_error, normal_error=normal_error, distribution=distribution
         )
@@ -257,6 +274,7 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
         self._scene.place(self._placement.draw(rng, self._scene.model))
         self._evidence = Evidence.none()
         self._belief = None
+        self._show()
         return self._observe(), self._info()
 
     def step(
@@ -280,7 +298,23 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
         self._recognize(touch)
         ended = self._belief is not None and (self._belief.unique or self._belief.empty)
         truncated = len(self.touches) >= self._max_probes
+        self._show()
         return self._observe(), -1.0, ended, truncated, self._info()
+
+    def render(self) -> NDArray[np.uint8] | None:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """The picture in mode "rgb_array"; in mode "human" it is in the window already.
+
+        Raises:
+            gymnasium.error.ResetNeeded: before the first reset.
+        """
+        if self._view is None or self.render_mode != "rgb_array":
+            return None
+        return self._view.picture(self)
+
+    def close(self) -> None:
+        """End what draws, and close the window, if there is one."""
+        if self._view is not None:
+            self._view.close()
 
     @property
     def true_object(self) -> Polyhedron:
@@ -318,6 +352,10 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
             known.contacts, free_space=free_space, support=support
         )
 
+    def _show(self) -> None:
+        if self._view is not None:
+            self._view.show(self)
+
     def _observe(self) -> Observation:
         # Past max_probes an episode may be stepped on; the observation keeps its last rows.
         touches = self.touches[-self._max_probes :]
@@ -345,3 +383,12 @@ def _free_object(
     if placement == "across":
         raise ValueError("a free object has to stand: placement must be 'resting' or 'dropped'")
     return FreeObject(mass=mass) if friction is None else FreeObject(mass=mass, friction=friction)
+
+
+def _view(mode: str) -> EpisodeView:
+    if mode not in ProbeEnv.metadata["render_modes"]:
+        known = (None, *ProbeEnv.metadata["render_modes"])
+        raise ValueError(f"render_mode is {mode!r}; it must be one of {known}")
+    from .episode_view import EpisodeView  # matplotlib comes with it
+
+    return EpisodeView(mode)

@@ -72,6 +72,11 @@ class ProbeRestEnv(ProbeEnv):
     ## Info
     `truth`, for scoring alone: `object` (name) and `pose` (4, 4), model to world.
 
+    ## Rendering
+    As in `palpate/Probe-v0`: `rgb_array` gives a picture, (600, 800, 3), of the object, the last
+    probe's rays, all contacts with the normals felt, and the leading rivals as ghosts; `human`
+    shows it in a window after each step.
+
     ## Arguments
     | name | default | meaning |
     |---|---|---|
@@ -85,6 +90,7 @@ class ProbeRestEnv(ProbeEnv):
     | hypotheses_shown | 16 | hypotheses in the observation |
     | tolerance | None | which poses count as the same |
     | limits | None | how far the recogniser searches |
+    | render_mode | None | None, "rgb_array" or "human" |
 
     ## References
     W. E. L. Grimson and T. Lozano-Perez, MIT AI Memo 738, 1983, Section 4.4.
@@ -106,6 +112,7 @@ class ProbeRestEnv(ProbeEnv):
         hypotheses_shown: int = 16,
         tolerance: PoseTolerance | None = None,
         limits: SearchLimits | None = None,
+        render_mode: str | None = None,
     ) -> None:
         """See the class for the arguments.
 
@@ -123,6 +130,7 @@ class ProbeRestEnv(ProbeEnv):
             hypotheses_shown=hypotheses_shown,
             tolerance=tolerance,
             limits=limits,
+            render_mode=render_mode,
         )
 
 
@@ -193,6 +201,11 @@ class ProbeFingerEnv(ProbeEnv):
     also `displacement`, what a tracker would tell: the largest `distance` (metres) by which a point
     of it was moved by the last probe, and the `turn` (radians).
 
+    ## Rendering
+    As in `palpate/Probe-v0`: `rgb_array` gives a picture, (600, 800, 3), of the object, the last
+    probe's rays, all contacts with the normals felt, and the leading rivals as ghosts; `human`
+    shows it in a window after each step.
+
     ## Arguments
     | name | default | meaning |
     |---|---|---|
@@ -212,6 +225,7 @@ class ProbeFingerEnv(ProbeEnv):
     | hypotheses_shown | 16 | hypotheses in the observation |
     | tolerance | None | which poses count as the same |
     | limits | None | how far the recogniser searches |
+    | render_mode | None | None, "rgb_array" or "human" |
 
     ## References
     W. E. L. Grimson and T. Lozano-Perez, MIT AI Memo 738, 1983, Section 4.4.
@@ -239,6 +253,7 @@ class ProbeFingerEnv(ProbeEnv):
         hypotheses_shown: int = 16,
         tolerance: PoseTolerance | None = None,
         limits: SearchLimits | None = None,
+        render_mode: str | None = None,
     ) -> None:
         """See the class for the arguments.
 
@@ -263,4 +278,5 @@ class ProbeFingerEnv(ProbeEnv):
             hypotheses_shown=hypotheses_shown,
             tolerance=tolerance,
             limits=limits,
+            render_mode=render_mode,
         )

@@ -3,26 +3,25 @@
 from __future__ import annotations
 
 import json as json_format
-from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, cast
 
 import typer
 
+from .episode_story import count, probe_line, stray_line, verdict, verdict_in_short
+
 if TYPE_CHECKING:
     from rich.console import Console
-    from scipy.spatial.transform import RigidTransform
 
+    from ..envs.film_script import EpisodeRecord
     from ..envs.probe_env import ProbeEnv
-    from ..envs.touch import Touch
+    from ..policies import Policy
     from ..recognizer import Belief, Hypothesis
 
 __all__ = ["episode"]
 
 MOST_POSES = 4000
 """How many poses the JSON document lists of all families together, one a hypothesis at least."""
-MOST_NAMED = 3
-"""Rays of a probe whose outcomes are told one by one."""
 MOST_GHOSTS = 2
 """More rivals than this in one picture hide each other."""
 
@@ -71,6 +70,15 @@ def episode(
         Path,
         typer.Option(metavar="FILE", help="Where to draw the end of the episode, as a PNG."),
     ] = Path("episode.png"),
+    video: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.mp4",
+            help="Film the episode: the finger at work, contacts as they come, rivals fading. "
+            "[dim]default: no film[/]",
+            show_default=False,
+        ),
+    ] = None,
     no_picture: Annotated[bool, typer.Option("--no-picture", help="Draw nothing.")] = False,
     position_error: Annotated[
         float,
@@ -91,18 +99,22 @@ def episode(
 ) -> None:
     """Touch an object in simulation until palpate knows which one it is and where it lies.
 
-    Prints what could still be true after each probe, and draws the end as a picture.
+    Prints what could still be true after each probe, and draws the end as a picture. With --video
+    it also films the episode, which takes about as long to draw as to watch, or a few times that.
     """
     import numpy as np
     from rich.console import Console
 
     from ..envs.picture import check_path
     from ..envs.probe_env import ProbeEnv
+    from ..envs.video import check_video_path
     from ..policies import make_policy
 
     chooser = make_policy(policy)
     if not no_picture:
         check_path(picture)
+    if video is not None:
+        check_video_path(video)
     env = ProbeEnv(
         library,
         object_name=object_name,
@@ -112,18 +124,42 @@ def episode(
         normal_error=float(np.radians(normal_error_deg)),
         max_probes=max_probes,
     )
-    # The policy's stream is the seed's child: it never meets the environment's own.
-    rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(1)[0])
     console = Console(highlight=False, quiet=json, soft_wrap=True)
     console.print(
         f"An unknown object, one of {len(env.library)},"
         f" {'lies across' if placement == 'across' else 'stands on'} a plane (seed {seed},"
         f" positions ±{1e3 * position_error:.3g} mm, normals ±{normal_error_deg:.3g}°)."
     )
+    if library is not None and (sensor in ("ball", "finger") or placement == "dropped"):
+        _tell_strays(env, console)
+    record, ruled_out = _play(env, chooser, seed, console)
+    if json:
+        print(json_format.dumps(_document(env, seed), indent=2))
+    else:
+        console.print(verdict(env))
+    if not no_picture:
+        _draw(env, ruled_out, picture, console)
+    if video is not None:
+        _film(record, video, console)
+
+
+def _play(
+    env: ProbeEnv, chooser: Policy, seed: int, console: Console
+) -> tuple[EpisodeRecord, list[tuple[Hypothesis, str]]]:
+    """Play an episode and tell it; the record of it, and what was ruled out, the latest first."""
+    import numpy as np
+
+    from ..envs.episode_picture import likeness_of
+    from ..envs.film_script import EpisodeRecord, Probed
+
+    # The policy's stream is the seed's child: it never meets the environment's own.
+    rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(1)[0])
     console.print(
         f"{'probe':<8}  {'its rays met':<20}  interpretations  hypotheses left", style="dim"
     )
     observation, _ = env.reset(seed=seed)
+    began_at = env.T_world_object
+    probes: list[Probed] = []
     ruled_out: list[tuple[Hypothesis, str]] = []
     ended = False
     while not ended:
@@ -131,110 +167,39 @@ def episode(
         action = chooser.act(observation, rng)
         observation, _, terminated, truncated, _ = env.step(action)
         ended = terminated or truncated
-        console.print(_told(len(env.touches), env.touches[-1], env.belief))
+        console.print(probe_line(len(env.touches), env.touches[-1], env.belief))
+        probes.append(Probed(env.touches[-1], env.contacts, env.belief, env.T_world_object))
         if before and env.belief and before is not env.belief:
-            ruled_out = _ruled_out(env, before, env.belief, len(env.touches)) + ruled_out
-    if json:
-        print(json_format.dumps(_document(env, seed), indent=2))
-    else:
-        console.print(_verdict(env))
-    if not no_picture:
-        _draw(env, ruled_out, picture, console)
-
-
-def _told(number: int, touch: Touch, belief: Belief | None) -> str:
-    """One line on what a probe met and what is left."""
-    from ..envs.scene import NOTHING, OBJECT, PLANE
-
-    names = {OBJECT: "object", PLANE: "plane", NOTHING: "nothing"}
-    outcomes = [names[int(outcome)] for outcome in touch.outcomes]
-    met = " ".join(f"{outcome:<6}" for outcome in outcomes)
-    if len(outcomes) > MOST_NAMED:
-        met = f"{', '.join(f'{many} {name}' for name, many in Counter(outcomes).items()):<20}"
-    if belief is None:
-        return f"probe {number:>2}  {met}  {'':>15}  nothing touched yet"
-    per_object = Counter(hypothesis.object_name for hypothesis in belief.hypotheses)
-    named = [f"{name} {count}" for name, count in per_object.most_common(3)]
-    rivals = ", ".join(named + ["…"] * (len(per_object) > 3))
-    left = len(belief.hypotheses)
+            ruled_out = _ruled_out(env, before, env.belief) + ruled_out
     return (
-        f"probe {number:>2}  {met}  {belief.interpretations:>15}"
-        + (f"  {left}: {rivals}" if left else "  none: not in the library")
-        + (", its pose still open" if left == 1 and not belief.hypotheses[0].determined else "")
-        + ("" if belief.complete else "  (search cut short)")
+        EpisodeRecord(
+            env.true_object, began_at, tuple(probes), likeness_of(env), verdict_in_short(env)
+        ),
+        ruled_out,
     )
 
 
-def _count(number: int, one: str, many: str = "") -> str:
-    return f"{number} {one if number == 1 else many or one + 's'}"
+def _tell_strays(env: ProbeEnv, console: Console) -> None:
+    """Say of each mesh how far what is collided with strays from it, where it does."""
+    from ..envs.collision import collision_parts
+
+    for model in env.library:
+        line = stray_line(model, collision_parts(model))
+        if line:
+            console.print(line)
 
 
-def _ruled_out(
-    env: ProbeEnv, before: Belief, after: Belief, probe: int
-) -> list[tuple[Hypothesis, str]]:
-    """Hypotheses of one belief that no hypothesis of the next resembles, heaviest first."""
-    from ..recognizer import pose_difference
+def _ruled_out(env: ProbeEnv, before: Belief, after: Belief) -> list[tuple[Hypothesis, str]]:
+    """The heaviest hypotheses of one belief that no hypothesis of the next resembles."""
+    from ..envs.episode_picture import likeness_of
 
-    models = {model.name: model for model in env.library}
-    tolerance = env.recognizer.tolerance
-    gone = []
+    likeness, gone = likeness_of(env), []
     for old in before.hypotheses:
-        model = models[old.object_name]
-        near = tolerance.distance(model.diameter, float(env.contacts.position_error.max()))
-        differences = [
-            pose_difference(model, old.pose, new.pose)
-            for new in after.hypotheses
-            if new.object_name == old.object_name
-        ]
-        if not any(
-            d.rotation < 2 * tolerance.rotation and d.translation < 2 * near for d in differences
+        if len(gone) < MOST_GHOSTS and not likeness.any_alike(
+            old.object_name, old.pose, after.hypotheses
         ):
-            gone.append((old, f"{old.object_name}, ruled out by probe {probe}"))
+            gone.append((old, f"{old.object_name}, ruled out by probe {len(env.touches)}"))
     return gone
-
-
-def _verdict(env: ProbeEnv) -> str:
-    """What was found, and how far it is from the truth."""
-    import numpy as np
-
-    from ..recognizer import pose_difference
-
-    belief, truth = env.belief, env.T_world_object
-    lines = [""]
-    if belief is None:
-        return f"\nNo probe touched the object ({env.true_object.name})."
-    if belief.empty:
-        return "\nNo object of the library fits the contacts."
-    best = belief.hypotheses[0]
-    if belief.unique:
-        lines.append(f"It is [bold]{best.object_name}[/].")
-    else:
-        lines.append(
-            f"Not unique after {_count(len(env.touches), 'probe')}:"
-            f" {_count(len(belief.hypotheses), 'hypothesis', 'hypotheses')} left;"
-            f" the heaviest is [bold]{best.object_name}[/] (weight {best.weight:.2f})."
-        )
-    lines.append(f"  pose   {_pose(best.pose)}")
-    lines.append(f"  truth  {_pose(truth)}  {env.true_object.name}")
-    if best.object_name == env.true_object.name:
-        error = pose_difference(env.true_object, best.pose, truth)
-        lines.append(
-            f"  error  {1e3 * error.translation:.2f} mm, {np.degrees(error.rotation):.2f}°"
-            f" after {_count(len(env.touches), 'probe')} and"
-            f" {_count(len(env.contacts), 'contact')}"
-        )
-    return "\n".join(lines)
-
-
-def _pose(pose: RigidTransform) -> str:
-    import numpy as np
-
-    x, y, z = 1e3 * pose.translation
-    turn = np.degrees(pose.rotation.as_rotvec())
-    return (
-        f"({x:7.2f}, {y:7.2f}, {z:7.2f}) mm,"
-        f" rotation vector ({turn[0]:7.2f}, {turn[1]:7.2f}, {turn[2]:7.2f})°"
-    )
 
 
 def _document(env: ProbeEnv, seed: int) -> dict[str, object]:
@@ -286,8 +251,28 @@ def _draw(
         env,
         (rivals + ruled_out)[:MOST_GHOSTS],
         title=f"{env.true_object.name}: {summary}",
-        subtitle=f"{_count(len(env.touches), 'probe')},"
-        f" {_count(len(env.contacts), 'contact')} on the object",
+        subtitle=f"{count(len(env.touches), 'probe')},"
+        f" {count(len(env.contacts), 'contact')} on the object",
     )
     note = renderer_note(draw(scene, path))
     console.print(f"\npicture: {path}" + (f" ({note})" if note else ""))
+
+
+def _film(record: EpisodeRecord, path: Path, console: Console) -> None:
+    """Film an episode, with a bar on stderr that says how far it is."""
+    from rich.console import Console
+    from rich.progress import Progress
+
+    from ..envs.episode_film import film_episode
+    from ..envs.picture import renderer_note
+
+    shown = Console(stderr=True)
+    with Progress(console=shown, transient=True, disable=not shown.is_terminal) as bar:
+        task = bar.add_task("drawing the video", total=None)
+        film = film_episode(
+            record,
+            path,
+            progress=lambda drawn, of: bar.update(task, completed=drawn, total=of),
+        )
+    note = renderer_note(film.renderer, "video")
+    console.print(f"video: {path}, {film.seconds:.0f} s" + (f" ({note})" if note else ""))

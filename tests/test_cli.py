@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -15,11 +16,12 @@ from palpate.assets import mesh_path
 from palpate.recognizer import Polyhedron, pose_difference
 
 
-def palpate(*arguments: str, cwd: Path) -> subprocess.CompletedProcess[str]:
+def palpate(*arguments: str, cwd: Path, **variables: str) -> subprocess.CompletedProcess[str]:
     program = "from palpate.scripts.cli import main; main()"
     return subprocess.run(
         [sys.executable, "-c", program, *arguments],
         cwd=cwd,
+        env={**os.environ, **variables},
         capture_output=True,
         text=True,
         check=False,
@@ -50,6 +52,57 @@ def test_an_episode_tells_its_story_and_draws_it(tmp_path):
     assert "error" in told.stdout
     assert (tmp_path / "end.png").stat().st_size > 10_000
     assert [path.name for path in tmp_path.iterdir()] == ["end.png"]
+
+
+def test_an_episode_is_filmed(tmp_path):
+    options = ("--object", "simple-hand", "--max-probes", "1", "--no-picture")
+    # Fewer pictures are drawn without GL.
+    told = palpate("episode", *options, "--video", "a.mp4", cwd=tmp_path, MUJOCO_GL="disable")
+    assert told.returncode == 0, told.stderr
+    assert told.stderr == ""
+    assert "video: a.mp4, " in told.stdout
+    assert "drawn by matplotlib" in told.stdout
+    assert [path.name for path in tmp_path.iterdir()] == ["a.mp4"]
+    assert (tmp_path / "a.mp4").read_bytes()[4:8] == b"ftyp"
+
+
+@pytest.mark.parametrize("sensor", ["ball", "ray"])
+def test_how_far_a_mesh_and_what_is_touched_of_it_differ_is_told_where_it_matters(tmp_path, sensor):
+    import trimesh
+
+    library = tmp_path / "library"
+    library.mkdir()
+    trimesh.creation.box((0.05, 0.06, 0.07)).export(library / "block.obj")
+    outline = np.array([(0, 0), (0.06, 0), (0.06, 0.02), (0.02, 0.02), (0.02, 0.05), (0, 0.05)])
+    turned = trimesh.transformations.rotation_matrix(0.5, (1, 2, 3))
+    corner = extruded(outline, 0.03)
+    corner.apply_transform(turned)
+    corner.export(library / "corner.stl")
+    options = ("--library", "library", "--sensor", sensor, "--max-probes", "1", "--no-picture")
+    told = palpate("episode", *options, "--seed", "0", cwd=tmp_path)
+    assert told.returncode == 0, told.stderr
+    lines = [line for line in told.stdout.splitlines() if "from its mesh by up to" in line]
+    if sensor == "ray":
+        assert not lines
+    else:
+        (line,) = lines
+        assert line.startswith("corner is touched as 2 convex parts that stray")
+
+
+def extruded(outline, height):
+    """An L-shaped prism, as a closed mesh."""
+    import trimesh
+
+    count = len(outline)
+    ends = [np.column_stack([outline, np.full(count, z)]) for z in (0.0, height)]
+    lid = np.array([(0, 1, 2), (0, 2, 3), (0, 3, 4), (0, 4, 5)])
+    walls = [
+        wall
+        for i in range(count)
+        for j in [(i + 1) % count]
+        for wall in ((i, j, j + count), (i, j + count, i + count))
+    ]
+    return trimesh.Trimesh(np.concatenate(ends), [*lid[:, ::-1], *(lid + count), *walls])
 
 
 def test_a_ball_finds_an_object_that_stands_on_the_plane(tmp_path):
@@ -117,6 +170,8 @@ def test_an_object_that_is_never_touched_is_no_mistake(tmp_path):
         (("episode", "--max-probes", "0"), ("--max-probes",)),
         (("episode", "--seed", "x"), ("--seed", "integer")),
         (("episode", "--picture", "no/folder/x.png"), ("no/folder",)),
+        (("episode", "--video", "no/folder/x.mp4"), ("no/folder",)),
+        (("episode", "--video", "x.avi"), ("x.avi", ".mp4")),
         (("reproduce", "table99"), ("table99", "table2")),
         (("juggle",), ("juggle",)),
     ],

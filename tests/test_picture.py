@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import pickle
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from PIL import Image
 
-from palpate.envs import picture, picture_view
-from palpate.envs.picture import Ghost, PictureScene, draw, renderer_note
+from palpate.envs import picture_view, renderer
+from palpate.envs.picture import Ghost, PictureScene, Tip, draw, renderer_note
+from palpate.envs.picture_view import Stage
+from palpate.envs.renderer import Renderer
 
 SIZE = 400, 300
 
@@ -30,6 +33,10 @@ def l_prism():
 
 @pytest.fixture
 def scene() -> PictureScene:
+    return l_scene()
+
+
+def l_scene() -> PictureScene:
     vertices, triangles = l_prism()
     contacts = np.array([(0.04, 0.01, 0.01), (0.01, 0.035, 0.01)])
     upward = np.array([(0.0, 0.0, 1.0)] * 2)
@@ -72,9 +79,9 @@ def no_gl(monkeypatch):
 @pytest.mark.usefixtures("no_gl")
 def test_without_gl_matplotlib_draws_and_says_so(scene, tmp_path):
     path = tmp_path / "out.png"
-    renderer = draw(scene, path, SIZE)
-    assert renderer == "matplotlib"
-    assert "matplotlib" in renderer_note(renderer)
+    painter = draw(scene, path, SIZE)
+    assert painter == "matplotlib"
+    assert "matplotlib" in renderer_note(painter)
     assert [p.name for p in tmp_path.iterdir()] == ["out.png"]
     image = pixels(path)
     assert image.shape == (SIZE[1], SIZE[0], 3)
@@ -84,10 +91,10 @@ def test_without_gl_matplotlib_draws_and_says_so(scene, tmp_path):
 
 
 def test_with_gl_both_renderers_draw_the_same_scene(scene, tmp_path, monkeypatch):
-    renderer = draw(scene, tmp_path / "gl.png", SIZE)
-    if renderer != "MuJoCo":
+    painter = draw(scene, tmp_path / "gl.png", SIZE)
+    if painter != "MuJoCo":
         pytest.skip("no GL library here")
-    assert renderer_note(renderer) == ""
+    assert renderer_note(painter) == ""
     by_gl = pixels(tmp_path / "gl.png")
     assert by_gl.shape == (SIZE[1], SIZE[0], 3)
     assert all(contact_is_painted(by_gl, scene, contact) for contact in scene.contacts_world)
@@ -100,7 +107,7 @@ def test_with_gl_both_renderers_draw_the_same_scene(scene, tmp_path, monkeypatch
 
 
 def test_a_renderer_that_hangs_is_given_up(scene, tmp_path, monkeypatch):
-    monkeypatch.setattr(picture, "GL_SECONDS", 0.01)
+    monkeypatch.setattr(renderer, "GL_SECONDS", 0.01)
     assert draw(scene, tmp_path / "out.png", SIZE) == "matplotlib"
 
 
@@ -154,12 +161,101 @@ def test_arrays_that_do_not_fit_are_named(scene):
         replace(scene, object_vertices_world=[])
 
 
-def test_a_scene_survives_its_file(scene, tmp_path):
-    picture.save_scene(scene, tmp_path / "scene.npz")
-    again = picture.load_scene(tmp_path / "scene.npz")
-    assert (again.title, again.plane_height, again.ghosts[0].label) == ("an L", 0.0, "a rival")
-    assert np.array_equal(again.rays_world, scene.rays_world)
-    assert np.array_equal(again.ghosts[0].vertices_world, scene.ghosts[0].vertices_world)
+def painted(painter, scene, stage):
+    return painter.draw(scene, stage, SIZE).astype(float) / 255
+
+
+@pytest.fixture(scope="module", params=["MuJoCo", "matplotlib"])
+def painter(request):
+    """A renderer of either kind."""
+    with pytest.MonkeyPatch.context() as patch:
+        if request.param == "matplotlib":
+            patch.setenv("MUJOCO_GL", "nonsense")
+        made = Renderer()
+        made.draw(l_scene(), Stage.of(l_scene(), SIZE), SIZE)
+    if made.name != request.param:
+        pytest.skip("no GL library here")
+    yield made
+    made.close()
+
+
+def test_a_ghost_fades_until_it_is_gone(painter, scene):
+    stage = Stage.of(scene, SIZE)
+    bare = painted(painter, replace(scene, ghosts=()), stage)
+
+    def weight(opacity):
+        ghosts = (replace(scene.ghosts[0], opacity=opacity),)
+        return np.abs(painted(painter, replace(scene, ghosts=ghosts), stage) - bare).sum()
+
+    whole, half, none = weight(1.0), weight(0.5), weight(0.0)
+    assert whole > 1.2 * half > 0.0
+    assert none < 0.01 * whole
+
+
+def test_a_ghost_keeps_the_colour_that_it_was_given(painter, scene):
+    stage = Stage.of(scene, SIZE)
+    (ghost,) = scene.ghosts
+    green = painted(painter, replace(scene, ghosts=(replace(ghost, colour=2),)), stage)
+    assert near(green, picture_view.GHOSTS[2]).any()
+    assert not near(green, picture_view.GHOSTS[0]).any()
+
+
+@pytest.mark.parametrize("radius", [0.0, 0.004])
+def test_a_tip_under_way_is_seen_where_it_is(painter, scene, radius):
+    stage = Stage.of(scene, SIZE)
+    path = np.array([(0.02, 0.03, 0.06), (0.03, 0.02, 0.025)])
+    alone = replace(scene, ghosts=(), rays_world=[], ray_hits=[])
+    x, y = np.round(stage.view.project(path[1], SIZE)[:2]).astype(int)
+    around = np.s_[y - 2 : y + 3, x - 2 : x + 3]
+    with_tip = painted(painter, replace(alone, tips=(Tip(path, radius),)), stage)[around]
+    assert near(with_tip, picture_view.RAY_HIT, 0.25).any()
+    assert not near(painted(painter, alone, stage)[around], picture_view.RAY_HIT, 0.25).any()
+
+
+def test_a_normal_of_no_length_has_no_arrow(painter, scene):
+    stage = Stage.of(scene, SIZE)
+    counts = [
+        near(
+            painted(painter, replace(scene, normals_world=length * scene.normals_world), stage),
+            picture_view.CONTACT,
+        ).sum()
+        for length in (0.0, 0.5, 1.0)
+    ]
+    assert 0 < counts[0] < counts[1] < counts[2]
+
+
+def test_one_process_draws_all_pictures_and_ends_when_told(scene):
+    stage = Stage.of(scene, SIZE)
+    with Renderer() as painter:
+        first = painter.draw(scene, stage, SIZE)
+        if painter.name != "MuJoCo":
+            pytest.skip("no GL library here")
+        process = painter._process
+        assert process is not None
+        moved = replace(scene, object_vertices_world=scene.object_vertices_world + (0.01, 0, 0))
+        assert not np.array_equal(painter.draw(moved, stage, SIZE), first)
+        assert np.array_equal(painter.draw(scene, stage, SIZE), first)
+        assert painter._process is process
+        copy = pickle.loads(pickle.dumps(painter))
+        assert copy._process is None, "a copy has a process of its own"
+    assert painter._process is None
+    assert not process.end.alive
+    assert np.array_equal(painter.draw(scene, stage, SIZE), first), "it starts again when needed"
+    painter.close()
+    painter.close()
+
+
+def test_a_process_that_dies_on_the_way_is_made_up_for(scene):
+    stage = Stage.of(scene, SIZE)
+    with Renderer() as painter:
+        painter.draw(scene, stage, SIZE)
+        if painter.name != "MuJoCo":
+            pytest.skip("no GL library here")
+        painter._untried.clear()
+        assert painter._process is not None
+        painter._process.end()
+        assert painter.draw(scene, stage, SIZE).shape == (SIZE[1], SIZE[0], 3)
+        assert painter.name == "matplotlib"
 
 
 @pytest.mark.parametrize("shared", [True, False], ids=["shared vertices", "loose triangles"])

@@ -38,7 +38,7 @@ every_env = pytest.mark.parametrize("kind", [ProbeEnv, PlanarProbeEnv, *READY.va
 def test_a_ready_made_environment_keeps_gymnasiums_contract(name):
     made = gymnasium.make(name, library=("simple-hand",), max_probes=3)
     assert type(made.unwrapped) is READY[name]
-    check_env(made.unwrapped)
+    check_env(made.unwrapped, skip_render_check=True)
 
 
 @every_env
