@@ -18,19 +18,20 @@ PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .NOTPARALLEL:
-.PHONY: help run test check format format-check lint wheel types smoke bench soundness assets clean
+.PHONY: help run test check format format-check lint wheel types smoke bench bench-touch soundness assets clean
 
 help:
 	@echo "palpate: recognise polyhedra by touch"
 	@echo
-	@echo "  make run        play one probing episode (sets up .venv the first time)"
-	@echo "  make test       run the tests"
-	@echo "  make check      format, lint, types, and the wheel tried outside the repository"
-	@echo "  make bench      measure the recogniser's speed and accuracy"
-	@echo "  make soundness  try 20,000 random cases and more: is the true pose ever lost?"
-	@echo "  make format     format the code and repair what lint can repair"
-	@echo "  make assets     rebuild the object library"
-	@echo "  make clean      remove .venv and everything built"
+	@echo "  make run          play one probing episode (sets up .venv the first time)"
+	@echo "  make test         run the tests"
+	@echo "  make check        format, lint, types, and the wheel tried outside the repository"
+	@echo "  make bench        measure the recogniser's speed and accuracy"
+	@echo "  make bench-touch  measure how exactly the sensors touch, and how fast"
+	@echo "  make soundness    try 20,000 random cases and more: is the true pose ever lost?"
+	@echo "  make format       format the code and repair what lint can repair"
+	@echo "  make assets       rebuild the object library"
+	@echo "  make clean        remove .venv and everything built"
 	@echo
 	@echo "  ARGS='...'         is handed on, as in: make run ARGS='--object stapler --seed 7'"
 	@echo "  PYTHON=python3.12  chooses the Python that .venv is made with (3.11 or newer)"
@@ -77,6 +78,9 @@ smoke: wheel
 
 bench: $(DEV) $(COMPILED)
 	@$(BIN)/python -m palpate.scripts.bench $(ARGS)
+
+bench-touch: $(DEV) $(COMPILED)
+	@$(BIN)/python -m palpate.scripts.bench_touch $(ARGS)
 
 soundness: $(DEV) $(COMPILED)
 	@$(BIN)/python -m palpate.scripts.soundness $(ARGS)

@@ -17,9 +17,9 @@ import numpy as np
 
 from ..assets import STAND_IN_NAMES, ConvexPart, load_parts
 from ..recognizer import Polyhedron
+from ..recognizer.file_cache import cache_folder, keep, read_kept
 from ..recognizer.table_cache import named_arrays
 from . import convex_cells, convex_cuts, convex_joins, hull, parts_check, winding
-from .file_cache import cache_folder, keep, read_kept
 from .hull import Hull
 from .mass import volume
 from .parts_check import LEVELS, stray
@@ -59,7 +59,7 @@ def collision_parts(model: Polyhedron, *, folder: Path | None = None) -> Collisi
     if body is None:
         body = _pack(worked_out_parts(model))
         if path is not None:
-            keep(path, body)
+            keep(path, body, "collision parts")
     return _unpack(body)
 
 
@@ -134,7 +134,7 @@ def _pack(found: CollisionParts) -> bytes:
     return file.getvalue()
 
 
-def _unpack(body: bytes) -> CollisionParts:
+def _unpack(body: bytes | memoryview) -> CollisionParts:
     with np.load(io.BytesIO(body), allow_pickle=False) as arrays:
         ends = np.cumsum(arrays["sizes"], axis=0)[:-1]
         corners = np.split(arrays["vertices"], ends[:, 0])

@@ -7,17 +7,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..recognizer import Contacts
+from ..recognizer import FACE, Contacts, FreeSpace
 from .noise import SensorNoise
 from .scene import NORMAL_ROUNDING, OBJECT, ProbeScene
-from .touch import (
-    ProbeCommand,
-    Touch,
-    check_reach,
-    take_contacts,
-    take_paths,
-    triad,
-)
+from .touch import ProbeCommand, Touch, check_reach, triad
 
 Floats = NDArray[np.float64]
 
@@ -40,6 +33,7 @@ class RaySensor:
         # What all touches share, by the number of contacts; read-only, as contacts hold them.
         self._position_errors = [np.full(n, noise.position_error) for n in range(4)]
         self._normal_errors = [np.full(n, noise.normal_error) for n in range(4)]
+        self._kinds = [np.full(n, FACE, np.int8) for n in range(4)]
         self._no_radius = np.zeros(3)
         self._none = Contacts.none()
         self._checked: ProbeScene | None = None
@@ -68,13 +62,15 @@ class RaySensor:
             # Neighbouring rows are a view; a list of rows would be copied, which takes longer.
             first = met.index(OBJECT)
             rows = [0, 2] if count == 2 and met[1] != OBJECT else slice(first, first + count)
-            contacts = take_contacts(
+            contacts = Contacts.trusted(
                 ends[rows],
                 normals[rows],
-                self._position_errors[count],
-                self._normal_errors[count],
-                directions[rows],
+                position_error=self._position_errors[count],
+                normal_error=self._normal_errors[count],
+                approaches=directions[rows],
+                kinds=self._kinds[count],
             )
         # A measured end is off by no more than its bound, so no place on the way there is either.
-        paths = take_paths(starts, ends, self._no_radius, self._position_errors[3])
+        error = self._position_errors[3]
+        paths = FreeSpace.trusted(starts, ends, radius=self._no_radius, error=error)
         return Touch(contacts, paths, starts, ends, readings.outcomes)

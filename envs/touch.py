@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Literal, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ..recognizer import FACE, Contacts, FreeSpace
+from ..recognizer import Contacts, FreeSpace
 from .free_body import STILL, Displacement
 from .noise import SensorNoise
 
@@ -134,49 +134,3 @@ def check_reach(reach: float, radius: float = 0.0) -> None:
             f"the tip's radius is {radius:g} m, but rays of {reach:g} m start only {height:.3g} m"
             " over the plane: a smaller tip is needed for objects so small"
         )
-
-
-def take_contacts(
-    positions: Floats,
-    normals: Floats,
-    position_error: Floats,
-    normal_error: Floats,
-    approaches: Floats,
-) -> Contacts:
-    """Contacts on faces, of arrays that are known to be good; they are taken over, read-only.
-
-    The checks of `Contacts` would take longer than the touch.
-
-    Args:
-        positions: (n, 3) metres, world frame, as all of them C-contiguous.
-        normals: (n, 3) unit vectors.
-        position_error: (n,) metres, above zero.
-        normal_error: (n,) radians, above zero and at most pi.
-        approaches: (n, 3) unit vectors, or rows of zeros.
-    """
-    contacts = object.__new__(Contacts)
-    values = contacts.__dict__
-    values["positions"], values["normals"], values["approaches"] = positions, normals, approaches
-    values["position_error"], values["normal_error"] = position_error, normal_error
-    values["kinds"] = np.full(len(positions), FACE, np.int8)
-    for value in (positions, normals, position_error, normal_error, approaches, values["kinds"]):
-        value.setflags(write=False)
-    return contacts
-
-
-def take_paths(starts: Floats, ends: Floats, radius: Floats, error: Floats) -> FreeSpace:
-    """Free space of arrays that are known to be good; they are taken over and made read-only.
-
-    Args:
-        starts: (m, 3) metres, world frame, as all of them C-contiguous.
-        ends: (m, 3) likewise.
-        radius: (m,) metres, zero or more.
-        error: (m,) metres, above zero.
-    """
-    paths = object.__new__(FreeSpace)
-    values = paths.__dict__
-    values["starts"], values["ends"] = starts, ends
-    values["radius"], values["error"] = radius, error
-    for value in (starts, ends, radius, error):
-        value.setflags(write=False)
-    return paths

@@ -100,30 +100,41 @@ class Contacts:
             raise ValueError(
                 f"normals: row {row} has length {lengths[row]:.6g}; normals must be unit vectors"
             )
-        self._hold(
-            points,
-            directions / lengths[:, None],
-            _bounds("position_error", position_error, count, np.inf),
-            cones,
-            _approaches(approaches, points.shape),
-            _kinds(kinds, count),
+        self.__dict__.update(
+            Contacts.trusted(
+                points,
+                directions / lengths[:, None],
+                position_error=_bounds("position_error", position_error, count, np.inf),
+                normal_error=cones,
+                approaches=_approaches(approaches, points.shape),
+                kinds=_kinds(kinds, count),
+            ).__dict__
         )
 
-    def _hold(
-        self,
+    @classmethod
+    def trusted(
+        cls,
         positions: NDArray[np.float64],
         normals: NDArray[np.float64],
+        *,
         position_error: NDArray[np.float64],
         normal_error: NDArray[np.float64],
         approaches: NDArray[np.float64],
         kinds: NDArray[np.int8],
-    ) -> None:
-        """Take over arrays that are known to be good."""
-        values = (positions, normals, position_error, normal_error, approaches, kinds)
-        names = ("positions", "normals", "position_error", "normal_error", "approaches", "kinds")
-        for name, value in zip(names, values, strict=True):
+    ) -> Contacts:
+        """Contacts of arrays that are known to be good: not checked, taken over, made read-only.
+
+        The checks take longer than a touch. All arrays are C-contiguous, of the shapes, types and
+        values that a `Contacts` has; the unit vectors are that to rounding.
+        """
+        contacts = object.__new__(cls)
+        values = contacts.__dict__
+        values["positions"], values["normals"] = positions, normals
+        values["position_error"], values["normal_error"] = position_error, normal_error
+        values["approaches"], values["kinds"] = approaches, kinds
+        for value in values.values():
             value.setflags(write=False)
-            object.__setattr__(self, name, value)
+        return contacts
 
     def __len__(self) -> int:
         return len(self.positions)
@@ -147,16 +158,14 @@ class Contacts:
         vague = self.approach_known & (self.normal_error > half_space)
         if not vague.any():
             return self
-        part = object.__new__(Contacts)
-        part._hold(
+        return Contacts.trusted(
             self.positions,
             np.where(vague[:, None], -self.approaches, self.normals),
-            self.position_error,
-            np.where(vague, half_space, self.normal_error),
-            self.approaches,
-            self.kinds,
+            position_error=self.position_error,
+            normal_error=np.where(vague, half_space, self.normal_error),
+            approaches=self.approaches,
+            kinds=self.kinds,
         )
-        return part
 
     def __getitem__(self, rows: ArrayLike | slice) -> Contacts:
         """The contacts of the given rows (a slice, indices or a mask), in that order."""
@@ -164,16 +173,14 @@ class Contacts:
         index = (
             rows if isinstance(rows, slice) else np.asarray(rows, None if np.size(rows) else int)
         )
-        part = object.__new__(Contacts)
-        part._hold(
+        return Contacts.trusted(
             np.ascontiguousarray(self.positions[index]),
             np.ascontiguousarray(self.normals[index]),
-            np.ascontiguousarray(self.position_error[index]),
-            np.ascontiguousarray(self.normal_error[index]),
-            np.ascontiguousarray(self.approaches[index]),
-            np.ascontiguousarray(self.kinds[index]),
+            position_error=np.ascontiguousarray(self.position_error[index]),
+            normal_error=np.ascontiguousarray(self.normal_error[index]),
+            approaches=np.ascontiguousarray(self.approaches[index]),
+            kinds=np.ascontiguousarray(self.kinds[index]),
         )
-        return part
 
     @classmethod
     def none(cls, dimension: int = 3) -> Contacts:

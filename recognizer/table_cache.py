@@ -10,11 +10,7 @@ from __future__ import annotations
 import hashlib
 import inspect
 import json
-import os
-import tempfile
-import warnings
 from collections.abc import Iterator
-from contextlib import suppress
 from dataclasses import fields, is_dataclass
 from functools import cache
 from math import prod
@@ -27,16 +23,16 @@ from numpy.typing import NDArray
 from . import features as features_module
 from . import range_kernels, ranges
 from .features import Features
+from .file_cache import cache_folder, keep, read_kept
 from .polyhedron import Polyhedron
 from .ranges import PairTables
 
-MAGIC = b"palpate tables 1\n"
+MAGIC = b"palpate tables 2\n"
 """What a file starts with; the number is that of the layout in `_pack`."""
 BUILDERS = (features_module, range_kernels, ranges)
 """The modules that tables are built by. Their text is part of a file's name."""
 ALIGNMENT = 16
 """Arrays start at multiples of this many bytes, as Python lays out what it reads."""
-CHECKSUM_BYTES = 16
 LENGTH_BYTES = 8
 
 Array = NDArray[Any]
@@ -63,22 +59,15 @@ def cached_tables(
     tables = None if path is None else _read(path)
     if tables is not None:
         return tables
-    content = _pack(PairTables.of(model, features))
+    body = _pack(PairTables.of(model, features))
     if path is not None:
-        try:
-            _write(path, content)
-        except OSError as error:
-            _warn_of(str(folder), error.strerror or type(error).__name__)
-    return _unpack(content)
+        keep(path, body, "range tables")
+    return _unpack(body)
 
 
 def default_folder() -> Path | None:
     """The folder for tables in the platform's cache; None if the user has no such place."""
-    from platformdirs import user_cache_path
-
-    folder = user_cache_path("palpate", appauthor=False) / "tables"
-    # Without a home directory the path comes back with its tilde, relative to wherever we are.
-    return folder if folder.is_absolute() else None
+    return cache_folder("tables")
 
 
 def table_key(model: Polyhedron, features: Features | None = None) -> str:
@@ -109,26 +98,8 @@ def named_arrays(value: Any, prefix: str = "") -> Iterator[tuple[str, Array]]:
             yield name, part
 
 
-def _write(path: Path, content: bytes) -> None:
-    """Write under a name of its own, then rename: no reader ever sees half a file.
-
-    Raises:
-        OSError: the folder can't be made or written.
-    """
-    path.parent.mkdir(parents=True, exist_ok=True)
-    handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=path.stem, suffix=".part")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(content)
-        os.replace(temporary, path)
-    except BaseException:
-        with suppress(OSError):
-            os.unlink(temporary)
-        raise
-
-
 def _pack(tables: PairTables) -> bytes:
-    """Magic, checksum, length of the header; then what the checksum is of: header and arrays."""
+    """Magic, length of the header, header and arrays."""
     layout, blocks, end = [], [], 0
     for field in (field for field in fields(tables) if field.init):
         array = np.ascontiguousarray(getattr(tables, field.name))
@@ -136,47 +107,25 @@ def _pack(tables: PairTables) -> bytes:
         layout.append([field.name, array.dtype.str, array.shape, end + -end % ALIGNMENT])
         end += len(blocks[-1])
     header = json.dumps(layout).encode()
-    before = len(MAGIC) + CHECKSUM_BYTES + LENGTH_BYTES
-    header += b" " * (-(before + len(header)) % ALIGNMENT)
-    body = b"".join([len(header).to_bytes(LENGTH_BYTES, "little"), header, *blocks])
-    return MAGIC + _checksum(body) + body
+    # A file has a checksum before it, which is as long as the arrays' alignment.
+    header += b" " * (-(len(MAGIC) + LENGTH_BYTES + len(header)) % ALIGNMENT)
+    return b"".join([MAGIC, len(header).to_bytes(LENGTH_BYTES, "little"), header, *blocks])
 
 
 def _read(path: Path) -> PairTables | None:
     """The tables in a file; None if there is none, or it isn't whole."""
-    try:
-        content = path.read_bytes()
-    except OSError:
-        return None
-    start = len(MAGIC) + CHECKSUM_BYTES
-    whole = content.startswith(MAGIC) and (
-        content[len(MAGIC) : start] == _checksum(memoryview(content)[start:])
-    )
-    return _unpack(content) if whole else None
+    body = read_kept(path)
+    return None if body is None or body[: len(MAGIC)] != MAGIC else _unpack(body)
 
 
-def _unpack(content: bytes) -> PairTables:
-    """The tables in a whole file's content."""
-    body = memoryview(content)[len(MAGIC) + CHECKSUM_BYTES :]
-    arrays_at = LENGTH_BYTES + int.from_bytes(body[:LENGTH_BYTES], "little")
-    layout = json.loads(bytes(body[LENGTH_BYTES:arrays_at]))
+def _unpack(body: bytes | memoryview) -> PairTables:
+    """The tables in what `_pack` made."""
+    length_at, header_at = len(MAGIC), len(MAGIC) + LENGTH_BYTES
+    arrays_at = header_at + int.from_bytes(body[length_at:header_at], "little")
+    layout = json.loads(bytes(body[header_at:arrays_at]))
     # Arrays over bytes, which never change, are read-only.
     arrays: dict[str, Array] = {
         name: np.frombuffer(body, dtype, prod(shape), arrays_at + at).reshape(shape)
         for name, dtype, shape, at in layout
     }
     return PairTables(**arrays)
-
-
-def _checksum(body: bytes | memoryview) -> bytes:
-    return hashlib.blake2b(body, digest_size=CHECKSUM_BYTES).digest()
-
-
-@cache
-def _warn_of(folder: str, reason: str) -> None:
-    """Warn once a process and folder, however many models there are."""
-    warnings.warn(
-        f"{folder}: range tables can't be kept here ({reason}), so they are built each time",
-        UserWarning,
-        stacklevel=3,
-    )

@@ -1,12 +1,14 @@
 """Measure the sensors: `python -m palpate.scripts.bench_touch`.
 
 Balls and fingers on their way to every face, convex edge and vertex of the stand-ins, against plain
-geometry that knows no simulator; and how long a triad takes, each figure beside its goal.
+geometry that knows no simulator; how long triads and steps take; and what it is worth to know that
+an object rests on the plane. Each figure stands beside its goal, where it has one.
 """
 
 from __future__ import annotations
 
 from enum import StrEnum
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -26,13 +28,8 @@ NORMAL_GOAL = 0.1
 """Largest angle of a normal on a face, degrees."""
 KIND_GOAL = 0.999
 """Share of contacts whose feature is told right."""
-TRIAD_GOAL = {"ray": 2e-5, "ball": 1e-3, "finger": 0.1}
-"""Median time of a triad, seconds."""
 NOTCH = 5e-4
 """A contact so deep inside the convex hull is in a notch, metres."""
-TRIADS = 1000
-PLACES = 20
-"""Triads a scene, and how often the object is placed anew among them."""
 
 
 class Part(StrEnum):
@@ -41,6 +38,8 @@ class Part(StrEnum):
     BALL = "ball"
     FINGER = "finger"
     SPEED = "speed"
+    STEPS = "steps"
+    PLACEMENT = "placement"
 
 
 def bench_touch(
@@ -52,21 +51,46 @@ def bench_touch(
         list[Part] | None,
         typer.Option(metavar="PART", help=f"Only this part; one or more of: {', '.join(Part)}."),
     ] = None,
-    quick: Annotated[bool, typer.Option("--quick", help="A tenth of the approaches.")] = False,
+    steps: Annotated[int, typer.Option(metavar="N", min=10, help="Steps that are timed.")] = 1000,
+    episodes: Annotated[
+        int, typer.Option(metavar="N", min=3, help="Episodes an object, of each placement.")
+    ] = 40,
+    robotics_python: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="PATH",
+            help="A Python that has gymnasium-robotics, to compare steps with; by default this.",
+        ),
+    ] = None,
+    quick: Annotated[
+        bool, typer.Option("--quick", help="A tenth of approaches, steps and episodes.")
+    ] = False,
 ) -> None:
-    """Measure how exactly balls and fingers touch, and how long a triad takes.
+    """Measure how exactly balls and fingers touch, and how long triads and steps take.
 
     ball, finger: approaches to each kind of feature of each stand-in, every feature in its turn,
     against plain geometry. speed: median time of a triad at random places around each stand-in.
+    steps: steps a second of the environment, with the recogniser and without, and of another
+    environment of touch. placement: how many probes fewer an object needs that rests on the plane.
     """
     keep_to_one_thread()
     # Only now: what these import reads the number of threads once.
+    from .bench_placement import measure_placement
     from .bench_report import show
+    from .bench_touch_speed import measure_steps, measure_triads
 
-    count = max(approaches // (QUICK if quick else 1), 1)
-    print(f"{count} approaches a kind of feature, seed {seed}, one thread")
+    share = QUICK if quick else 1
+    print(f"seed {seed}, one thread, processor time")
     for part in only or list(Part):
-        show(measure_speed(seed) if part == Part.SPEED else measure_touch(part, count, seed))
+        if part == Part.SPEED:
+            show(measure_triads(seed))
+        elif part == Part.STEPS:
+            show(measure_steps(max(steps // share, 10), seed, robotics_python))
+        elif part == Part.PLACEMENT:
+            for section in measure_placement(max(episodes // share, 3), seed):
+                show(section)
+        else:
+            show(measure_touch(part, max(approaches // share, 1), seed))
 
 
 def measure_touch(name: str, approaches: int, seed: int) -> Section:
@@ -83,10 +107,10 @@ def measure_touch(name: str, approaches: int, seed: int) -> Section:
     return Section(
         f"{name}, tip of {1e3 * RADIUS:g} mm: largest error of position, before noise",
         rows,
-        "Place and normal are even over a feature, orientations over all that face the ball within"
-        " 84 degrees. Goals are for the largest error of all approaches; on edges and vertices the"
-        " normal has none. A contact is in a notch if it is half a millimetre or more inside the"
-        " convex hull.",
+        f"{approaches} approaches a kind of feature. Place and normal are even over a feature,"
+        " orientations over all that face the ball within 84 degrees. Goals are for the largest"
+        " error of all approaches; on edges and vertices the normal has none. A contact is in a"
+        " notch if it is half a millimetre or more inside the convex hull.",
     )
 
 
@@ -150,56 +174,6 @@ def _sensor(name: str, model: Polyhedron) -> BallSensor | FingerSensor:
     if name == "ball":
         return BallSensor(noise, reach, RADIUS)
     return FingerSensor(noise, reach, FingerDesign(radius=RADIUS))
-
-
-def measure_speed(seed: int) -> Section:
-    """How long a triad of each sensor takes, around each stand-in."""
-    from ..envs.library import load_library
-    from .bench_report import Section
-
-    rows = [_speed_row(name, model, seed) for name in TRIAD_GOAL for model in load_library()]
-    return Section(
-        "a triad, command to report, median / 99th percentile of processor time",
-        rows,
-        "Triads meet anywhere in the square that the environment sends them to, around objects"
-        " placed as the environment places them.",
-    )
-
-
-def _speed_row(name: str, model: Polyhedron, seed: int) -> Row:
-    import numpy as np
-
-    from ..envs.noise import SensorNoise
-    from ..envs.placement import AcrossPlane
-    from ..envs.probe_env import HALF_WIDTH, INCH, REACH
-    from ..envs.scene import ProbeScene
-    from ..envs.sensors import make_sensor
-    from ..envs.touch import ProbeCommand
-    from .bench_report import Row, median_and_tail, steps, timed
-
-    rng = np.random.default_rng(seed)
-    noise = SensorNoise(position_error=0.01 * INCH, normal_error=np.pi / 10.0)
-    sensor = make_sensor(name, noise, REACH * model.diameter)
-    half_width = HALF_WIDTH * model.diameter
-    scene, placement = ProbeScene(model), AcrossPlane(offset=0.2 * half_width)
-    seconds, contacts = [], 0
-    for index in steps(range(TRIADS), f"speed: {name}, {model.name}"):
-        if index % (TRIADS // PLACES) == 0:
-            scene.place(placement.draw(rng, model))
-        x, y, yaw = rng.uniform(-1.0, 1.0, 3) * (half_width, half_width, np.pi / 3.0)
-        command = ProbeCommand(float(x), float(y), float(yaw))
-        touch, spent = timed(sensor.touch, scene, command, rng)
-        seconds.append(spent)
-        contacts += len(touch.contacts)
-    median, tail = median_and_tail(seconds)
-    goal = 1e3 * TRIAD_GOAL[name]
-    return Row(
-        f"{name}, {model.name}",
-        f"{median:.3f} / {tail:.2f} ms",
-        f"{goal:g} ms",
-        median <= goal,
-        [f"{contacts / TRIADS:.2f} contacts a triad"],
-    )
 
 
 if __name__ == "__main__":

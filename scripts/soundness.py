@@ -2,16 +2,19 @@
 
 First random cases, see `soundness_cases`: in each the true interpretation is to be among those of
 some hypothesis, and every pose that is called proven is to meet every bound, as `soundness_check`
-finds without palpate's own geometry. Then whole episodes, see `soundness_episodes`.
+finds without palpate's own geometry. Then whole episodes of every sensor and placement, see
+`soundness_episodes`: the true pose is to be in every belief.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
+import signal
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from .bench import keep_to_one_thread
@@ -21,10 +24,13 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from .soundness_check import Outcome
+    from .soundness_episodes import Episode
 
 T = TypeVar("T")
 
 COMMAND = "python -m palpate.scripts.soundness"
+STOPPED = 130
+"""What a run returns that was told to stop, as shells have it."""
 MOST_SHOWN = 4
 """Broken bounds that are told of one case."""
 
@@ -41,6 +47,16 @@ def run_case(kind: str, seed: int, index: int) -> Outcome:
         return raised(case, error)
 
 
+def run_episode(setting: str, seed: int, index: int, probes: int | None) -> Episode:
+    """Play and judge an episode; one that raises counts as failed, and says so."""
+    from .soundness_episodes import play, raised
+
+    try:
+        return play(setting, seed, index, probes)
+    except Exception as error:
+        return raised(f"{setting}:{index}", error)
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the campaign and print its tables; 1 if a truth was lost or a pose broke a bound."""
     keep_to_one_thread()
@@ -48,17 +64,43 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from rich.console import Console
 
     from .soundness_cases import KINDS
+    from .soundness_episodes import PLACEMENTS, SENSORS, settings
 
-    options = _parser({name: kind.what for name, kind in KINDS.items()}).parse_args(arguments)
+    parser = _parser(
+        {name: kind.what for name, kind in KINDS.items()}, list(SENSORS), list(PLACEMENTS)
+    )
+    options = parser.parse_args(arguments)
+    options.settings = settings(options.sensor, options.placement)
+    if not options.settings:
+        parser.error("rays in the plane have no placement: leave it out, or name another sensor")
     console = Console(highlight=False, soft_wrap=True)
     if options.only:
-        return _only(console, options.only, options.seed)
+        return _only(console, options)
     failed = False
-    if options.cases:
-        failed |= _cases(console, options, tuple(options.kinds or KINDS))
-    if options.episodes:
-        failed |= _episodes(console, options)
+    try:
+        with _told_to_stop():
+            if options.cases:
+                failed |= _cases(console, options, tuple(options.kinds or KINDS))
+            if options.episodes:
+                failed |= _episodes(console, options)
+    except KeyboardInterrupt:
+        console.print("stopped before the end")
+        return STOPPED
     return int(failed)
+
+
+@contextmanager
+def _told_to_stop() -> Iterator[None]:
+    """Take a request to terminate as Ctrl-C is taken, so that what was found is still told."""
+
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, interrupt)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGTERM, before)
 
 
 def _cases(console: Console, options: argparse.Namespace, kinds: tuple[str, ...]) -> bool:
@@ -88,31 +130,54 @@ def _cases(console: Console, options: argparse.Namespace, kinds: tuple[str, ...]
 
 
 def _episodes(console: Console, options: argparse.Namespace) -> bool:
-    from ..assets import STAND_IN_NAMES
-    from .soundness_episodes import episode_table, play
+    from .soundness_episodes import head_line, line, tell
 
-    jobs = [(name, seed) for name in STAND_IN_NAMES for seed in range(options.episodes)]
-    outcomes = list(_spread(play, jobs, "episodes", console, options.workers))
-    outcomes.sort(key=lambda o: (STAND_IN_NAMES.index(o.object_name), o.seed))
     console.print(
-        "\nEpisodes with random probes, at 0.01 in and pi/10, at most 40 probes.\n"
-        "wrong: ended with one hypothesis, and not the truth; s: mean seconds an episode.\n"
+        "\nEpisodes with random probes, at 0.01 in and pi/10 (planar: 0.1 in and pi/8); half of"
+        "\nthem with Gaussian noise, half told of free space. truth kept: in every belief, after"
+        "\nevery probe. cut short: a limit ended a search, so that the truth may be missing there."
+        "\nwrong: ended with one hypothesis, and not the truth; off: by how much at most such a"
+        "\npose is, in pose tolerances; s: mean seconds an episode.\n"
     )
-    console.print(episode_table(outcomes))
-    lost = [outcome for outcome in outcomes if not outcome.kept]
-    for outcome in lost:
-        console.print(f"lost: palpate episode --object {outcome.object_name} --seed {outcome.seed}")
-    return bool(lost)
+    console.print(head_line())
+    failed = False
+    for setting in options.settings:
+        jobs = [(setting, options.seed, k, options.probes) for k in range(options.episodes)]
+        outcomes = []
+        try:
+            for outcome in _spread(run_episode, jobs, setting, console, options.workers):
+                outcomes.append(outcome)
+        finally:
+            # Here, so that a run that is stopped says what it had.
+            if outcomes:
+                console.print(line(setting, outcomes))
+            for bad in sorted((o for o in outcomes if o.failed), key=lambda o: o.index):
+                failed = True
+                console.print(f"{_command(bad.name, options)}\n    {tell(bad)}", markup=False)
+    return failed
 
 
-def _only(console: Console, name: str, seed: int) -> int:
+def _command(name: str, options: argparse.Namespace) -> str:
+    """The command that runs one case or episode alone."""
+    probes = f" --probes {options.probes}" if options.probes else ""
+    return f"{COMMAND} --seed {options.seed}{probes} --only {name}"
+
+
+def _only(console: Console, options: argparse.Namespace) -> int:
     from .soundness_cases import KINDS, draw_case
     from .soundness_check import judge
+    from .soundness_episodes import SETTINGS, play, tell
 
+    name, seed = options.only, options.seed
     kind, _, index = name.partition(":")
-    if kind not in KINDS or not index.isdecimal():
-        console.print(f"{name!r} names no case: say KIND:INDEX, of the kinds {', '.join(KINDS)}")
+    if kind not in (*KINDS, *SETTINGS) or not index.isdecimal():
+        known = ", ".join((*KINDS, *SETTINGS))
+        console.print(f"{name!r} names no case: say KIND:INDEX, of the kinds {known}")
         return 2
+    if kind in SETTINGS:
+        episode = play(kind, seed, int(index), options.probes)
+        console.print(f"{_command(name, options)}\n    {tell(episode)}", markup=False)
+        return int(episode.failed)
     outcome = judge(draw_case(kind, seed, int(index)))
     _tell(console, outcome, seed)
     return int(outcome.lost or bool(outcome.bad))
@@ -175,11 +240,17 @@ def _spread(
         return
     with ProcessPoolExecutor(workers) as pool:
         running = [pool.submit(call, *job) for job in jobs]
-        for job in track(as_completed(running), **bar):
-            yield job.result()
+        try:
+            for job in track(as_completed(running), **bar):
+                yield job.result()
+        finally:
+            # Whoever stops listening doesn't wait for what hasn't begun.
+            pool.shutdown(wait=False, cancel_futures=True)
 
 
-def _parser(kinds: dict[str, str]) -> argparse.ArgumentParser:
+def _parser(
+    kinds: dict[str, str], sensors: list[str], placements: list[str]
+) -> argparse.ArgumentParser:
     listed = "\n".join(f"  {name:<14}{what}" for name, what in kinds.items())
     parser = argparse.ArgumentParser(
         prog=COMMAND,
@@ -188,14 +259,22 @@ def _parser(kinds: dict[str, str]) -> argparse.ArgumentParser:
         "\nand look for a truth that is lost or for a proven pose that breaks a bound."
         "\nExits with 1 if there is one.",
         epilog=f"kinds of case:\n{listed}\n\n"
-        "A case is fixed by seed, kind and index, whatever else runs and on however many\n"
-        "workers. Each that fails is printed as the command that runs it alone, such as:\n"
-        f"  {COMMAND} --seed 0 --only free:17",
+        "A case is fixed by seed, kind and index, and an episode by seed, sensor, placement and\n"
+        "index, whatever else runs and on however many workers. Each that fails is printed as the\n"
+        "command that runs it alone, such as:\n"
+        f"  {COMMAND} --seed 0 --only free:17\n"
+        f"  {COMMAND} --seed 0 --only ball/resting:17",
     )
     add = parser.add_argument
     add("--cases", metavar="N", type=_count, default=20_000, help="random cases (20000)")
-    add("--episodes", metavar="N", type=_count, default=100, help="episodes an object (100)")
-    add("--seed", metavar="S", type=_count, default=0, help="seed of the cases (0)")
+    add(
+        "--episodes",
+        metavar="N",
+        type=_count,
+        default=100,
+        help="episodes of each sensor and placement (100)",
+    )
+    add("--seed", metavar="S", type=_count, default=0, help="seed of all (0)")
     add(
         "--workers",
         metavar="N",
@@ -204,7 +283,22 @@ def _parser(kinds: dict[str, str]) -> argparse.ArgumentParser:
         help="processes (as many as there are processors)",
     )
     add("--kinds", metavar="KIND", nargs="+", choices=list(kinds), help="only these kinds (all)")
-    add("--only", metavar="KIND:INDEX", help="one case alone, told in full; no episodes")
+    add(
+        "--sensor",
+        nargs="+",
+        choices=sensors,
+        metavar="NAME",
+        help=f"episodes of only these sensors, of {', '.join(sensors)} (all)",
+    )
+    add(
+        "--placement",
+        nargs="+",
+        choices=placements,
+        metavar="NAME",
+        help=f"episodes of only these placements, of {', '.join(placements)} (all)",
+    )
+    add("--probes", metavar="N", type=_one_or_more, help="most probes an episode (by sensor)")
+    add("--only", metavar="KIND:INDEX", help="one case or episode alone, told in full")
     return parser
 
 

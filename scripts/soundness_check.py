@@ -174,7 +174,7 @@ def _contact_breaches(case: Case, pose: RigidTransform, row: Row, model: Polyhed
     for i, f in enumerate(map(int, row)):
         if f < 0:
             continue
-        corners, cone = _feature(case, model, f)
+        corners, cone = feature_of(case, model, f)
         distance = float(triangle_distances(points[i], corners).min())
         if distance > contacts.position_error[i] * (1.0 + ROUNDING):
             broken.append(f"has contact {i} {distance:.9g} m from feature {f}")
@@ -185,7 +185,7 @@ def _contact_breaches(case: Case, pose: RigidTransform, row: Row, model: Polyhed
     return broken
 
 
-def _feature(case: Case, model: Polyhedron, feature: int) -> tuple[Floats, Floats]:
+def feature_of(case: Case, model: Polyhedron, feature: int) -> tuple[Floats, Floats]:
     """(t, 3, 3) triangles of a feature, flat of an edge or vertex, and (k, 3) its normals."""
     if feature < model.face_count:
         triangles = model.triangles[model.triangle_faces == feature]
@@ -218,7 +218,7 @@ def _approach_breaches(case: Case, pose: RigidTransform, row: Row, model: Polyhe
     broken = []
     for i in np.flatnonzero(case.contacts.approach_known & (row >= 0)):
         # If no corner of a cone faces the finger, nothing between them does.
-        normals = pose.rotation.apply(_feature(case, model, int(row[i]))[1])
+        normals = pose.rotation.apply(feature_of(case, model, int(row[i]))[1])
         facing = float((normals @ -case.contacts.approaches[i]).max())
         if facing < -np.sin(APPROACH_ERROR) - EXACT:
             broken.append(f"shows approach {i} feature {row[i]} from behind, by {facing:.9g}")

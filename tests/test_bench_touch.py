@@ -11,8 +11,8 @@ from checker import signed_distances
 from oracles import box, model, random_pose
 from scipy.spatial.transform import RigidTransform
 
-from palpate.recognizer import Polyhedron
-from palpate.scripts import bench_touch
+from palpate.recognizer import Polyhedron, Recognizer
+from palpate.scripts import bench_placement, bench_touch, bench_touch_speed
 from palpate.scripts.sweep_oracle import EDGE, FACE, VERTEX, SweepOracle
 from palpate.scripts.touch_cases import KINDS, ApproachSampler, depth_in_hull
 
@@ -101,8 +101,69 @@ def test_a_row_is_met_or_missed_by_its_largest_error(name, monkeypatch):
 
 
 def test_the_speed_of_triads_has_a_row_an_object(monkeypatch):
-    monkeypatch.setattr(bench_touch, "TRIADS", 20)
-    row = bench_touch._speed_row("ball", model("housing"), 0)
+    monkeypatch.setattr(bench_touch_speed, "TRIADS", 20)
+    row = bench_touch_speed._triad_row("ball", model("housing"), 0)
     assert row.what == "ball, housing"
     assert row.goal == "1 ms"
     assert row.met is not None
+
+
+def test_steps_are_timed_with_the_recogniser_and_triads_without():
+    row = bench_touch_speed._step_row(12, 2)
+    assert row.here.endswith("steps/s")
+    assert "12 steps" in row.details[1]
+    rate = bench_touch_speed._rate_row(300, 0)
+    # Even a triad a millisecond would be a fiftieth of what it is.
+    assert float(rate.here.replace(",", "").removesuffix(" /s")) > 1000.0
+
+
+@pytest.mark.parametrize(
+    ("script", "shown"),
+    [
+        ("import no_such_module", "not installed"),
+        ("raise RuntimeError('no hand')", "does not run"),
+        ("import sys; print([[0.001] * int(sys.argv[1]), []])", "1,000 steps/s"),
+    ],
+)
+def test_another_environment_is_measured_where_it_is_installed(script, shown, monkeypatch):
+    monkeypatch.setattr(bench_touch_speed, "ROBOTICS_STEPS", script)
+    assert bench_touch_speed._robotics_row(3, None).here == shown
+
+
+def test_a_python_that_is_not_there_is_said(tmp_path):
+    row = bench_touch_speed._robotics_row(3, tmp_path / "python")
+    assert row.here == "not measured"
+    assert "No such file" in row.details[0]
+
+
+def test_resting_and_lying_across_are_compared_probe_for_probe(monkeypatch):
+    solid = model("simple-hand")
+    monkeypatch.setattr(bench_placement, "load_library", lambda: (solid,))
+    monkeypatch.setattr(bench_placement, "MOST_PROBES", 8)
+    across, untold = bench_placement.measure_placement(4, 0)
+    assert [row.what for row in across.rows] == ["simple-hand", "all"]
+    assert across.rows[0].here == across.rows[1].here
+    assert (across.rows[0].goal, untold.rows[0].met) == ("fewer", None)
+    assert untold.rows[0].details[0].startswith(bench_placement.TOLD)
+    assert bench_placement.measure_placement(4, 0)[1].rows == untold.rows
+
+
+def test_knowing_the_plane_never_needs_more_probes_on_the_same_touches(monkeypatch):
+    monkeypatch.setattr(bench_placement, "MOST_PROBES", 8)
+    recognizer, solid = Recognizer([model("simple-hand")]), model("simple-hand")
+    for index in range(6):
+        told, untold = (
+            bench_placement._play(recognizer, solid, way, np.random.SeedSequence(index))
+            for way in (bench_placement.TOLD, bench_placement.UNTOLD)
+        )
+        assert told.probes <= untold.probes
+        assert told.unique >= untold.unique
+
+
+def test_the_interval_of_a_mean_is_around_it_and_narrows():
+    rng = np.random.default_rng(0)
+    few, many = rng.normal(-2.0, 1.0, 20), rng.normal(-2.0, 1.0, 2000)
+    wide, narrow = (bench_placement.interval(x, np.random.default_rng(1)) for x in (few, many))
+    assert wide[0] < few.mean() < wide[1]
+    assert narrow[1] - narrow[0] < 0.3 * (wide[1] - wide[0])
+    assert bench_placement.interval(np.full(5, -3.0), rng) == (-3.0, -3.0)

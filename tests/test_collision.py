@@ -16,7 +16,7 @@ from manifold3d import Manifold
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from palpate.assets import STAND_IN_NAMES, ConvexPart, load_parts
-from palpate.envs import collision, convex_cuts, file_cache
+from palpate.envs import collision, convex_cuts
 from palpate.envs.collision import (
     MOST_STRAY,
     CollisionParts,
@@ -27,7 +27,7 @@ from palpate.envs.collision import (
 from palpate.envs.convex_cells import Cell, Plane, split_polygon
 from palpate.envs.hull import Hull
 from palpate.envs.parts_check import stray
-from palpate.recognizer import Polyhedron
+from palpate.recognizer import Polyhedron, file_cache
 from palpate.recognizer.rays import cast_rays
 
 # --- Solids and oracles ---------------------------------------------------------------------
@@ -505,7 +505,7 @@ def test_a_folder_that_cannot_be_written_is_said_and_does_no_harm(tmp_path):
     folder = tmp_path / "a file"
     folder.write_text("in the way")
     model = oracles.model("cube")
-    with pytest.warns(UserWarning, match="nothing can be kept here"):
+    with pytest.warns(UserWarning, match="collision parts can't be kept here"):
         found = collision_parts(model, folder=folder)
     assert same(found, worked_out_parts(model))
 

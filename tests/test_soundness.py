@@ -6,8 +6,11 @@ and a share of the campaign that is `make soundness`, of every kind of case.
 
 from __future__ import annotations
 
+import os
+import signal
 from dataclasses import replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,13 +18,24 @@ from scipy.spatial.transform import RigidTransform
 from sensing import INCH, feel, sense_grid
 
 from palpate.assets import mesh_path
-from palpate.recognizer import Belief, Contacts, PairTables, Polyhedron, SupportPlane
+from palpate.envs.sensors import SENSOR_NAMES
+from palpate.recognizer import (
+    VERTEX,
+    Belief,
+    Contacts,
+    PairTables,
+    Polyhedron,
+    Recognizer,
+    SupportPlane,
+)
 from palpate.recognizer.pose import ModelTest
 from palpate.recognizer.tree import prune
 from palpate.scripts import soundness
 from palpate.scripts.soundness_case import Case
 from palpate.scripts.soundness_cases import KINDS, draw_case, draw_kind
 from palpate.scripts.soundness_check import breaches, holds_truth, judge
+from palpate.scripts.soundness_episodes import SETTINGS, Episode, play, settings, tell
+from palpate.scripts.soundness_truth import false_reports, possible_features, true_hypotheses
 
 ROWS = [
     (name, parts, inches)
@@ -256,3 +270,146 @@ def test_a_lost_truth_is_told_with_its_command(
     assert "LOST: python -m palpate.scripts.soundness --seed 0 --only mixed:0" in told
     assert soundness.main(["--only", "mixed:0"]) == 1
     assert soundness.main(["--only", "mixed"]) == 2
+
+
+# Episodes
+
+
+@pytest.mark.parametrize("setting", SETTINGS)
+def test_no_episode_loses_the_truth(setting: str) -> None:
+    # Of the four kinds of noise and knowledge, another for each setting.
+    played = play(setting, 13, SETTINGS.index(setting), probes=3)
+    assert not played.failed, tell(played)
+    assert played.contacts > 0
+
+
+def test_the_settings_are_every_sensor_in_every_placement() -> None:
+    # Planar has a placement of its own, and only a finger moves what is free.
+    assert len(SETTINGS) == 3 * len(SENSOR_NAMES) + 2
+    assert "finger/free" in SETTINGS
+    assert "ray/free" not in SETTINGS
+    assert settings(["ball"], ["resting", "dropped"]) == ("ball/resting", "ball/dropped")
+    assert settings(["planar"]) == ("planar/plane",)
+    assert settings(["planar"], ["resting"]) == ()
+
+
+@pytest.mark.parametrize("setting", ["planar/plane", "range-grid/resting"])
+def test_an_episode_is_fixed_by_its_seed(setting: str) -> None:
+    one, same, other = (play(setting, seed, 2, probes=2) for seed in (1, 1, 2))
+    assert replace(one, seconds=0.0) == replace(same, seconds=0.0)
+    assert replace(one, seconds=0.0) != replace(other, seconds=0.0)
+
+
+@pytest.mark.parametrize("kind", ["faces", "planar", "edges", "known-kinds"])
+def test_contacts_are_found_on_the_features_they_were_made_on(kind: str) -> None:
+    case = many_contacts(kind)
+    possible = possible_features(case)
+    rows = np.arange(len(case.contacts))
+    assert possible[rows, case.interpretation].all()
+    assert false_reports(case, possible) == []
+    assert true_hypotheses(case, case.recognize(), possible) != []
+
+
+@pytest.mark.parametrize("kind", ["faces", "planar"])
+def test_a_pose_off_by_twice_the_bound_is_on_no_such_features(kind: str) -> None:
+    case = many_contacts(kind)
+    normals = case.model.normals[case.interpretation]
+    along = case.truth.rotation.as_matrix()[:, : normals.shape[1]] @ normals[0]
+    away = replace(case, truth=shoved(case.truth, 2.5 * case.contacts.position_error[0] * along))
+    possible = possible_features(away)
+    assert true_hypotheses(away, case.recognize(), possible) == []
+    assert false_reports(away, possible) != []
+
+
+def test_a_contact_is_on_nothing_of_another_kind() -> None:
+    case = many_contacts("faces")
+    assert possible_features(case).any(axis=1).all()
+    contacts = case.contacts
+    turned = Contacts(
+        contacts.positions,
+        contacts.normals,
+        position_error=contacts.position_error,
+        normal_error=contacts.normal_error,
+        kinds=VERTEX,
+    )
+    assert not possible_features(replace(case, contacts=turned)).any()
+
+
+def test_a_symmetric_copy_of_the_true_pose_is_the_true_pose() -> None:
+    cases = (draw_case("planar", 5, k) for k in range(50))
+    case = next(c for c in cases if c.model.name == "wrench" and len(c.contacts) > 8)
+    copy = ((case.interpretation + 6) % 12).astype(np.int32)
+    belief, possible = case.recognize(), possible_features(case)
+    (held,) = true_hypotheses(case, belief, possible)
+    for row, count in ((copy, 1), ((copy + 1) % 12, 0)):
+        told = replace(belief, hypotheses=(replace(held, interpretations=row[None]),))
+        assert len(true_hypotheses(case, told, possible)) == count
+
+
+EPISODES = ["--cases", "0", "--episodes", "4", "--sensor", "planar", "--workers"]
+
+
+def rows_of(told: str) -> list[list[str]]:
+    """The table's rows without their times."""
+    lines = (line.split() for line in told.splitlines())
+    return [line[:-1] for line in lines if line and line[0] in SETTINGS and "━" not in line[1]]
+
+
+def test_two_workers_play_what_one_plays(capsys: pytest.CaptureFixture[str]) -> None:
+    shown = []
+    for workers in ("1", "2"):
+        assert soundness.main([*EPISODES, workers]) == 0
+        shown.append(rows_of(capsys.readouterr().out))
+    assert shown[0] == shown[1]
+    assert shown[0][0][:2] == ["planar/plane", "4/4"]
+
+
+@pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGINT])
+def test_a_run_that_is_told_to_stop_says_what_it_had(
+    how: signal.Signals, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def stopped(setting: str, seed: int, index: int, probes: int | None) -> Episode:
+        if index == 2:
+            os.kill(os.getpid(), how)
+        return play(setting, seed, index, probes)
+
+    monkeypatch.setattr(soundness, "run_episode", stopped)
+    before = signal.getsignal(signal.SIGTERM)
+    assert soundness.main([*EPISODES, "1"]) == soundness.STOPPED
+    told = capsys.readouterr().out
+    assert rows_of(told)[0][:2] == ["planar/plane", "2/2"]
+    assert "stopped before the end" in told
+    assert signal.getsignal(signal.SIGTERM) == before
+
+
+def test_a_truth_that_an_episode_loses_is_told_with_its_command(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    recognize = Recognizer.recognize
+
+    def forgetful(self: Recognizer, *args: Any, **known: Any) -> Belief:
+        return replace(recognize(self, *args, **known), hypotheses=())
+
+    monkeypatch.setattr(Recognizer, "recognize", forgetful)
+    assert soundness.main([*EPISODES, "1"]) == 1
+    told = capsys.readouterr().out
+    assert "python -m palpate.scripts.soundness --seed 0 --only planar/plane:0" in told
+    assert "the true pose was not in 1 beliefs" in told
+    assert soundness.main(["--only", "planar/plane:0"]) == 1
+
+
+def test_an_episode_that_raises_has_failed(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(*_: Any, **__: Any) -> Belief:
+        raise RuntimeError("out of order")
+
+    monkeypatch.setattr(Recognizer, "recognize", broken)
+    assert soundness.main([*EPISODES, "1"]) == 1
+    assert "raised RuntimeError: out of order" in capsys.readouterr().out
+
+
+def test_rays_in_the_plane_have_no_placement(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        soundness.main(["--sensor", "planar", "--placement", "resting"])
+    assert "no placement" in capsys.readouterr().err

@@ -16,7 +16,7 @@ import pytest
 from oracles import SOLIDS, model
 
 from palpate.assets import STAND_IN_NAMES
-from palpate.recognizer import PairTables, Polyhedron, table_cache
+from palpate.recognizer import PairTables, Polyhedron, file_cache, table_cache
 from palpate.recognizer.features import all_features
 from palpate.recognizer.polyhedron import FacePolygons
 from palpate.recognizer.table_cache import cached_tables, default_folder, table_key
@@ -97,7 +97,7 @@ def test_a_write_that_fails_leaves_no_file(tmp_path, monkeypatch):
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(os, "replace", full)
-    table_cache._warn_of.cache_clear()
+    file_cache._warn_of.cache_clear()
     with pytest.warns(UserWarning, match="No space left"):
         cached_tables(model("cube"), tmp_path)
     assert list(tmp_path.iterdir()) == []
@@ -131,7 +131,7 @@ def run(code: str, folder: Path) -> subprocess.Popen[bytes]:
 def test_a_folder_that_cannot_be_written_is_said_once_and_costs_no_more(tmp_path):
     in_the_way = tmp_path / "file"
     in_the_way.write_text("not a folder")
-    table_cache._warn_of.cache_clear()
+    file_cache._warn_of.cache_clear()
     names = ("cube", "l-block", "cube")
     with pytest.warns(UserWarning, match="can't be kept here") as told:
         found = [cached_tables(model(name), in_the_way / "tables") for name in names]

@@ -22,20 +22,23 @@ def cache_folder(name: str) -> Path | None:
     return folder if folder.is_absolute() else None
 
 
-def read_kept(path: Path) -> bytes | None:
+def read_kept(path: Path) -> memoryview | None:
     """What `keep` wrote; None if there is no such file, or it isn't whole."""
     try:
         content = path.read_bytes()
     except OSError:
         return None
-    body = content[CHECKSUM_BYTES:]
+    body = memoryview(content)[CHECKSUM_BYTES:]
     return body if content[:CHECKSUM_BYTES] == _checksum(body) else None
 
 
-def keep(path: Path, body: bytes) -> None:
+def keep(path: Path, body: bytes, what: str) -> None:
     """Write under a name of its own, then rename: no reader ever sees half a file.
 
-    A folder that can't be written is said once, as a warning.
+    Args:
+        path: of the file; a folder that can't be written is said once, as a warning.
+        body: what to write, behind a checksum of `CHECKSUM_BYTES`.
+        what: what it is, for the warning: "range tables".
     """
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -49,18 +52,18 @@ def keep(path: Path, body: bytes) -> None:
                 os.unlink(temporary)
             raise
     except OSError as error:
-        _warn_of(str(path.parent), error.strerror or type(error).__name__)
+        _warn_of(str(path.parent), what, error.strerror or type(error).__name__)
 
 
-def _checksum(body: bytes) -> bytes:
+def _checksum(body: bytes | memoryview) -> bytes:
     return hashlib.blake2b(body, digest_size=CHECKSUM_BYTES).digest()
 
 
 @cache
-def _warn_of(folder: str, reason: str) -> None:
-    """Warn once a process and folder."""
+def _warn_of(folder: str, what: str, reason: str) -> None:
+    """Warn once a process and folder, however many files there are."""
     warnings.warn(
-        f"{folder}: nothing can be kept here ({reason}), so it is worked out each time",
+        f"{folder}: {what} can't be kept here ({reason}), so they are worked out each time",
         UserWarning,
-        stacklevel=3,
+        stacklevel=4,
     )
