@@ -11,6 +11,7 @@ import numpy as np
 from gymnasium import spaces
 
 from ..recognizer import Belief, Contacts
+from ..recognizer.predict import PoseSamples
 from .touch import Touch
 
 Observation = dict[str, Any]
@@ -25,6 +26,8 @@ class ObservationLayout:
     """The most rays in an episode."""
     hypotheses: int
     """Hypotheses shown, heaviest first."""
+    samples: int
+    """Poses shown that stand for the belief."""
     objects: int
     """Objects in the library."""
     extent: float
@@ -33,6 +36,7 @@ class ObservationLayout:
     def space(self) -> spaces.Dict:
         """The observation space."""
         rays, shown, extent = self.rays, self.hypotheses, self.extent
+        samples = self.samples
         largest = np.iinfo(np.int64).max
 
         def box(low: float, high: float, *shape: int) -> spaces.Box:
@@ -60,6 +64,14 @@ class ObservationLayout:
                 "hypothesis_weights": box(0.0, 1.0, shown),
                 "hypothesis_determined": integers(0, 1, shown),
                 "interpretation_count": integers(0, largest, 1),
+                "sample_count": integers(0, samples, 1),
+                "sample_objects": integers(-1, self.objects - 1, samples),
+                "sample_hypotheses": integers(0, largest, samples),
+                "sample_positions": box(-extent, extent, samples, 3),
+                "sample_quaternions": box(-1.0, 1.0, samples, 4),
+                "sample_weights": box(0.0, 1.0, samples),
+                "sample_position_spread": box(0.0, extent, samples),
+                "sample_rotation_spread": box(0.0, np.pi, samples),
             }
         )
 
@@ -74,6 +86,7 @@ class ObservationLayout:
         contacts: Contacts,
         touches: Sequence[Touch],
         belief: Belief | None,
+        samples: PoseSamples,
         object_index: dict[str, int],
     ) -> Observation:
         """The observation of an episode so far; every array is fresh.
@@ -108,4 +121,13 @@ class ObservationLayout:
             values["hypothesis_quaternions"][row] = np.clip(quaternion, -1.0, 1.0)
             values["hypothesis_weights"][row] = hypothesis.weight
             values["hypothesis_determined"][row] = hypothesis.determined
+        shown = len(samples)
+        values["sample_count"][0] = shown
+        values["sample_objects"][:shown] = samples.objects
+        values["sample_hypotheses"][:shown] = samples.hypotheses
+        values["sample_positions"][:shown] = samples.positions.clip(-self.extent, self.extent)
+        values["sample_quaternions"][:shown] = samples.rotations.clip(-1.0, 1.0)
+        values["sample_weights"][:shown] = samples.weights.clip(0.0, 1.0)
+        values["sample_position_spread"][:shown] = samples.position_spread.clip(0.0, self.extent)
+        values["sample_rotation_spread"][:shown] = samples.rotation_spread.clip(0.0, np.pi)
         return values

@@ -21,6 +21,8 @@ from ..recognizer import (
     SearchLimits,
     SupportPlane,
 )
+from ..recognizer.pose_samples import sample_belief
+from ..recognizer.predict import PoseSamples
 from .evidence import Evidence
 from .finger_sensor import FingerSensor
 from .free_body import STILL
@@ -75,7 +77,7 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
 
     ## Observation Space
     A `Dict` of `Box`es. R is `max_probes` times the sensor's rays (three; of "range" 36, of
-    "range-grid" 147), H is `hypotheses_shown`; unused rows are zero.
+    "range-grid" 147), H is `hypotheses_shown`, S is `samples_shown`; unused rows are zero.
 
     | key | shape | meaning |
     |---|---|---|
@@ -95,6 +97,13 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
     | hypothesis_weights | (H,) | shares of the belief |
     | hypothesis_determined | (H,) | 1 if the contacts fix all six freedoms |
     | interpretation_count | (1,) | interpretations left |
+    | sample_count | (1,) | poses that stand for the belief; 0 before the first contact |
+    | sample_objects | (S,) | index into the library |
+    | sample_hypotheses | (S,) | which hypothesis, counted from 0, heaviest first |
+    | sample_positions, sample_quaternions | (S, 3), (S, 4) | as those of hypotheses |
+    | sample_weights | (S,) | shares of the belief; they sum to 1 |
+    | sample_position_spread | (S,) | standard deviation of the centroid around each, metres |
+    | sample_rotation_spread | (S,) | the same of the rotation, radians |
 
     ## Rewards
     -1 a probe.
@@ -144,6 +153,7 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
     | use_free_space | False | whether the recogniser is told of the paths that were free |
     | max_probes | 40 | probes before truncation |
     | hypotheses_shown | 16 | hypotheses in the observation |
+    | samples_shown | 256 | the most poses in the observation that stand for the belief |
     | tolerance | None | which poses count as the same |
     | limits | None | how far the recogniser searches |
     | render_mode | None | None, "rgb_array" or "human" |
@@ -178,6 +188,7 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
         use_free_space: bool = False,
         max_probes: int = 40,
         hypotheses_shown: int = 16,
+        samples_shown: int = 256,
         tolerance: PoseTolerance | None = None,
         limits: SearchLimits | None = None,
         render_mode: str | None = None,
@@ -189,10 +200,15 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
                 loaded, an object of less than a millimetre or more than ten metres, a bound that
                 isn't positive, a radius or a force that the sensor or the objects don't allow, an
                 object that is free but doesn't stand, or a mass or friction of one that isn't free,
-                or fewer than one probe or hypothesis.
+                or fewer than one probe, hypothesis or sample.
             gymnasium.error.DependencyNotInstalled: render mode "human" where no window can open.
         """
-        for name, value in (("max_probes", max_probes), ("hypotheses_shown", hypotheses_shown)):
+        sizes = {
+            "max_probes": max_probes,
+            "hypotheses_shown": hypotheses_shown,
+            "samples_shown": samples_shown,
+        }
+        for name, value in sizes.items():
             if value < 1:
                 raise ValueError(f"{name} is {value}; it must be at least 1")
         self.render_mode = render_mode
@@ -231,6 +247,7 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
         self._layout = ObservationLayout(
             rays=max(one.rays for one in self.sensors) * max_probes,
             hypotheses=hypotheses_shown,
+            samples=samples_shown,
             objects=len(self.library),
             extent=2.0 * REACH * largest + max(one.noise.position_error for one in self.sensors),
         )
@@ -240,6 +257,7 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
         self._scene: ProbeScene | None = None
         self._evidence = Evidence.none()
         self._belief: Belief | None = None
+        self._samples = PoseSamples.none(self.library)
 
     @property
     def belief(self) -> Belief | None:
@@ -274,6 +292,7 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
         self._scene.place(self._placement.draw(rng, self._scene.model))
         self._evidence = Evidence.none()
         self._belief = None
+        self._samples = PoseSamples.none(self.library)
         self._show()
         return self._observe(), self._info()
 
@@ -343,6 +362,7 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
             return
         if not len(known.contacts):
             self._belief = None
+            self._samples = PoseSamples.none(self.library)
             return
         support = self._support
         if self._free and support and not self._placed().stands(support.error):
@@ -351,6 +371,7 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
         self._belief = self.recognizer.recognize(
             known.contacts, free_space=free_space, support=support
         )
+        self._samples = sample_belief(self._belief, self.library, self._layout.samples)
 
     def _show(self) -> None:
         if self._view is not None:
@@ -360,7 +381,7 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
         # Past max_probes an episode may be stepped on; the observation keeps its last rows.
         touches = self.touches[-self._max_probes :]
         contacts = self.contacts[slice(-self._layout.rays, None)]
-        return self._layout.pack(contacts, touches, self._belief, self._index)
+        return self._layout.pack(contacts, touches, self._belief, self._samples, self._index)
 
     def _info(self) -> dict[str, Any]:
         pose = self.T_world_object.as_matrix()

@@ -35,8 +35,8 @@ class ProbeRestEnv(ProbeEnv):
     (`env.half_width`); rays come in at a slant, so they also reach what lies somewhat outside.
 
     ## Observation Space
-    A `Dict` of `Box`es. R is three times `max_probes`, H is `hypotheses_shown`; unused rows
-    are zero.
+    A `Dict` of `Box`es. R is three times `max_probes`, H is `hypotheses_shown`, S is
+    `samples_shown`; unused rows are zero.
 
     | key | shape | meaning |
     |---|---|---|
@@ -56,6 +56,13 @@ class ProbeRestEnv(ProbeEnv):
     | hypothesis_weights | (H,) | shares of the belief |
     | hypothesis_determined | (H,) | 1 if the contacts fix all six freedoms |
     | interpretation_count | (1,) | interpretations left |
+    | sample_count | (1,) | poses that stand for the belief; 0 before the first contact |
+    | sample_objects | (S,) | index into the library |
+    | sample_hypotheses | (S,) | which hypothesis, counted from 0, heaviest first |
+    | sample_positions, sample_quaternions | (S, 3), (S, 4) | as those of hypotheses |
+    | sample_weights | (S,) | shares of the belief; they sum to 1 |
+    | sample_position_spread | (S,) | standard deviation of the centroid around each, metres |
+    | sample_rotation_spread | (S,) | the same of the rotation, radians |
 
     ## Rewards
     -1 a probe.
@@ -88,6 +95,7 @@ class ProbeRestEnv(ProbeEnv):
     | distribution | uniform | of the noise inside its bounds: "uniform" or "gaussian" |
     | max_probes | 40 | probes before truncation |
     | hypotheses_shown | 16 | hypotheses in the observation |
+    | samples_shown | 256 | the most poses in the observation that stand for the belief |
     | tolerance | None | which poses count as the same |
     | limits | None | how far the recogniser searches |
     | render_mode | None | None, "rgb_array" or "human" |
@@ -110,6 +118,7 @@ class ProbeRestEnv(ProbeEnv):
         distribution: Distribution = "uniform",
         max_probes: int = 40,
         hypotheses_shown: int = 16,
+        samples_shown: int = 256,
         tolerance: PoseTolerance | None = None,
         limits: SearchLimits | None = None,
         render_mode: str | None = None,
@@ -128,6 +137,7 @@ class ProbeRestEnv(ProbeEnv):
             distribution=distribution,
             max_probes=max_probes,
             hypotheses_shown=hypotheses_shown,
+            samples_shown=samples_shown,
             tolerance=tolerance,
             limits=limits,
             render_mode=render_mode,
@@ -160,8 +170,8 @@ class ProbeFingerEnv(ProbeEnv):
     (`env.half_width`); rays come in at a slant, so they also reach what lies somewhat outside.
 
     ## Observation Space
-    A `Dict` of `Box`es. R is three times `max_probes`, H is `hypotheses_shown`; unused rows
-    are zero.
+    A `Dict` of `Box`es. R is three times `max_probes`, H is `hypotheses_shown`, S is
+    `samples_shown`; unused rows are zero.
 
     | key | shape | meaning |
     |---|---|---|
@@ -181,6 +191,13 @@ class ProbeFingerEnv(ProbeEnv):
     | hypothesis_weights | (H,) | shares of the belief |
     | hypothesis_determined | (H,) | 1 if the contacts fix all six freedoms |
     | interpretation_count | (1,) | interpretations left |
+    | sample_count | (1,) | poses that stand for the belief; 0 before the first contact |
+    | sample_objects | (S,) | index into the library |
+    | sample_hypotheses | (S,) | which hypothesis, counted from 0, heaviest first |
+    | sample_positions, sample_quaternions | (S, 3), (S, 4) | as those of hypotheses |
+    | sample_weights | (S,) | shares of the belief; they sum to 1 |
+    | sample_position_spread | (S,) | standard deviation of the centroid around each, metres |
+    | sample_rotation_spread | (S,) | the same of the rotation, radians |
 
     ## Rewards
     -1 a probe.
@@ -223,6 +240,7 @@ class ProbeFingerEnv(ProbeEnv):
     | use_free_space | False | whether the recogniser is told of the paths that were free |
     | max_probes | 40 | probes before truncation |
     | hypotheses_shown | 16 | hypotheses in the observation |
+    | samples_shown | 256 | the most poses in the observation that stand for the belief |
     | tolerance | None | which poses count as the same |
     | limits | None | how far the recogniser searches |
     | render_mode | None | None, "rgb_array" or "human" |
@@ -251,6 +269,7 @@ class ProbeFingerEnv(ProbeEnv):
         use_free_space: bool = False,
         max_probes: int = 40,
         hypotheses_shown: int = 16,
+        samples_shown: int = 256,
         tolerance: PoseTolerance | None = None,
         limits: SearchLimits | None = None,
         render_mode: str | None = None,
@@ -276,6 +295,7 @@ class ProbeFingerEnv(ProbeEnv):
             use_free_space=use_free_space,
             max_probes=max_probes,
             hypotheses_shown=hypotheses_shown,
+            samples_shown=samples_shown,
             tolerance=tolerance,
             limits=limits,
             render_mode=render_mode,

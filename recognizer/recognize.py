@@ -120,7 +120,7 @@ class Recognizer:
         Raises:
             ValueError: no solid of that name.
         """
-        return self._solid(name).tables
+        return self.solid(name).tables
 
     def features(self, name: str) -> Features:
         """What of a solid contacts may lie on; interpretations are rows of its indices.
@@ -128,7 +128,7 @@ class Recognizer:
         Raises:
             ValueError: no solid of that name.
         """
-        return self._solid(name).features
+        return self.solid(name).features
 
     def sample_poses(
         self, hypothesis: Hypothesis, contacts: Contacts, most: int = 256
@@ -151,7 +151,12 @@ class Recognizer:
             return span_polygon(entry, hypothesis, contacts, self.tolerance, most)
         return span_solid(entry, hypothesis, contacts, self.tolerance, most)
 
-    def _solid(self, name: str) -> SolidEntry:
+    def solid(self, name: str) -> SolidEntry:
+        """A solid with all that was built of it.
+
+        Raises:
+            ValueError: no solid of that name.
+        """
         entry = self._entry(name)
         if isinstance(entry, PlanarEntry):
             raise ValueError(f"{name!r} is an outline; it has edges alone, and planar tables")

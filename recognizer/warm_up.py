@@ -14,6 +14,9 @@ from .contacts import Contacts
 from .free_space import FreeSpace
 from .polygon import Polygon
 from .polyhedron import Polyhedron
+from .pose_samples import sample_belief
+from .predict import predict
+from .probes import ProbeSpace
 from .rays import cast_rays
 from .recognize import Recognizer
 from .support import SupportPlane
@@ -21,7 +24,7 @@ from .tree import Constraints, prune
 
 
 def warm_up() -> None:
-    """Run the whole recogniser once on a box and on a rectangle."""
+    """Run the recogniser and the predictor once on a box, the recogniser on a rectangle too."""
     import trimesh
 
     box = Polyhedron.from_mesh(trimesh.creation.box((1.0, 2.0, 3.0)), name="box")
@@ -30,7 +33,8 @@ def warm_up() -> None:
         hits.points_world, hits.normals_world, position_error=0.01, normal_error=0.1
     )
     recognizer = Recognizer([box])
-    recognizer.recognize(contacts).update(contacts)
+    belief = recognizer.recognize(contacts).update(contacts)
+    predict(sample_belief(belief, [box], 64), ProbeSpace(1.0, 5.0).rays(np.zeros((1, 3))))
     paths = FreeSpace(5.0 * np.eye(3), hits.points_world, error=0.01)
     floor = SupportPlane(height=-1.5, error=0.01, resting=True)
     recognizer.recognize(contacts, free_space=paths, support=floor)

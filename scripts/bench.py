@@ -27,6 +27,7 @@ class Part(StrEnum):
     LARGE = "large"
     ACCURACY = "accuracy"
     TABLES = "tables"
+    PREDICT = "predict"
 
 
 def bench(
@@ -55,13 +56,15 @@ def bench(
     speed: contacts to belief, where the time goes, and the floor of the bit operations. icp: the
     same contacts given to multi-start ICP. start: the first belief of a fresh process. scale: a
     large library, and time a model against the number of contacts. large: models of 500 faces.
-    accuracy: pose errors beside the memo's Table V. tables: range tables, once a model.
+    accuracy: pose errors beside the memo's Table V. tables: range tables, once a model. predict:
+    what many poses say of many probes.
     """
     keep_to_one_thread()
     # Only now: what these import reads the number of threads once.
     from .bench_accuracy import measure_accuracy
     from .bench_icp import measure_icp
     from .bench_models import measure_large, measure_tables
+    from .bench_predict import measure_predict
     from .bench_report import Settings, show, show_header
     from .bench_scale import measure_scale
     from .bench_speed import measure_speed
@@ -75,6 +78,7 @@ def bench(
         Part.LARGE: measure_large,
         Part.ACCURACY: measure_accuracy,
         Part.TABLES: measure_tables,
+        Part.PREDICT: measure_predict,
     }
     share = QUICK if quick else 1
     settings = Settings(
