@@ -22,6 +22,8 @@ __all__ = ["episode"]
 
 MOST_POSES = 4000
 """How many poses the JSON document lists of all families together, one a hypothesis at least."""
+TOLD_PUSH = 1e-5
+"""How far an object has to be pushed for it to be told, metres."""
 MOST_GHOSTS = 2
 """More rivals than this in one picture hide each other."""
 
@@ -60,6 +62,19 @@ def episode(
             help="How the object lies: across the plane, resting on it, or dropped on it.",
         ),
     ] = "across",
+    free: Annotated[
+        bool,
+        typer.Option("--free", help="What stands on the plane moves when the finger pushes it."),
+    ] = False,
+    force: Annotated[
+        float | None,
+        typer.Option(
+            metavar="N",
+            help="The finger pushes until it feels so many newtons."
+            " [dim]default: it stops at first contact[/]",
+            show_default=False,
+        ),
+    ] = None,
     policy: Annotated[
         str, typer.Option(metavar="NAME", help="The strategy that chooses the probes.")
     ] = "random",
@@ -119,7 +134,9 @@ def episode(
         library,
         object_name=object_name,
         placement=cast("Literal['across', 'resting', 'dropped']", placement),
+        free=free,
         sensor=sensor,
+        force_threshold=force,
         position_error=position_error,
         normal_error=float(np.radians(normal_error_deg)),
         max_probes=max_probes,
@@ -168,6 +185,13 @@ def _play(
         observation, _, terminated, truncated, _ = env.step(action)
         ended = terminated or truncated
         console.print(probe_line(len(env.touches), env.touches[-1], env.belief))
+        moved = env.touches[-1].displacement
+        if moved.distance > TOLD_PUSH:
+            console.print(
+                f"          it was pushed: {1e3 * moved.distance:.2f} mm,"
+                f" {np.degrees(moved.turn):.2f}°; {len(env.contacts)} contacts still hold",
+                style="dim",
+            )
         probes.append(Probed(env.touches[-1], env.contacts, env.belief, env.T_world_object))
         if before and env.belief and before is not env.belief:
             ruled_out = _ruled_out(env, before, env.belief) + ruled_out

@@ -204,3 +204,14 @@ def test_an_inverted_mesh_is_mended_and_said(tmp_path):
     assert told.returncode == 0, told.stderr
     lines = told.stderr.strip().splitlines()
     assert lines == ["palpate: block: its winding was inverted (normals pointed inwards); mended"]
+
+
+def test_a_free_object_is_pushed_and_that_is_told(tmp_path):
+    options = ("--object", "stapler", "--sensor", "finger", "--placement", "resting", "--free")
+    more = ("--force", "2", "--max-probes", "2", "--no-picture")
+    told = palpate("episode", *options, *more, cwd=tmp_path)
+    assert told.returncode == 0, told.stderr
+    assert "it was pushed: " in told.stdout
+    held = palpate("episode", "--free", "--no-picture", cwd=tmp_path)
+    assert held.returncode == 2
+    assert "a free object has to stand" in held.stderr
