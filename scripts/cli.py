@@ -12,6 +12,7 @@ from typing import Annotated
 import typer
 
 from .episode import episode
+from .library import library
 from .recognize import recognize
 from .reproduce import reproduce
 
@@ -26,6 +27,7 @@ app = typer.Typer(
 )
 app.command()(episode)
 app.command()(recognize)
+app.command()(library)
 app.command()(reproduce)
 
 BAD_INPUT = 2
