@@ -11,9 +11,11 @@ from typing import Annotated
 
 import typer
 
+from .benchmark import benchmark
 from .episode import episode
 from .library import library
 from .recognize import recognize
+from .report import report
 from .reproduce import reproduce
 
 __all__ = ["app", "main"]
@@ -28,6 +30,8 @@ app = typer.Typer(
 app.command()(episode)
 app.command()(recognize)
 app.command()(library)
+app.command()(benchmark)
+app.command()(report)
 app.command()(reproduce)
 
 BAD_INPUT = 2
