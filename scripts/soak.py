@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from .soak_run import Soaked
 
 COMMAND = "python -m palpate.scripts.soak"
+WARM_UP = 20
+"""Steps before which memory grows anyhow: code is loaded when it is first needed."""
 MOST_GROWTH = 32e6
 """Of memory, bytes: what a heap takes to settle. Three kilobytes kept a step would be as much."""
 SLOW = 1.0
@@ -93,7 +95,7 @@ def failures(name: str, soaked: Soaked) -> list[str]:
         ("observations outside their space", soaked.outside),
     ):
         told += [f"{name}: {count} {what}"] if count else []
-    if soaked.growth > MOST_GROWTH:
+    if soaked.steps >= WARM_UP and soaked.growth > MOST_GROWTH:
         told.append(f"{name}: memory grew by {soaked.growth / 1e6:.0f} MB")
     return told
 

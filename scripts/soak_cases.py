@@ -29,8 +29,8 @@ class Setting:
         """The environment itself, without wrappers; its finger, if any, is a watched one."""
         arguments = dict(self.arguments, **({"limits": CUT_SHORT} if cut_short else {}))
         env = gymnasium.make(self.env_id, disable_env_checker=True, **arguments).unwrapped
-        if isinstance(env, ProbeEnv) and isinstance(env.sensor, FingerSensor):
-            env.sensor = WatchedFinger.like(env.sensor)
+        if isinstance(env, ProbeEnv) and isinstance(env.sensors[0], FingerSensor):
+            env.sensors = (WatchedFinger.like(env.sensors[0]),)
         if not isinstance(env, ProbeEnv | PlanarProbeEnv):
             raise ValueError(f"{self.env_id} is {type(env).__name__}, which is not soaked here")
         return env

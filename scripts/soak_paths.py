@@ -87,13 +87,13 @@ def judge_last_probe(env: ProbeEnv | PlanarProbeEnv, action: Floats) -> list[Way
     inside = np.clip(np.asarray(action, np.float64), -1.0, 1.0)
     if isinstance(env, PlanarProbeEnv):
         return [_judge_planar(env, inside)]
-    if isinstance(env.sensor, RaySensor | BallSensor | FingerSensor):
+    if isinstance(env.sensors[0], RaySensor | BallSensor | FingerSensor):
         return _judge_triad(env, inside)
     return _judge_lines(env)
 
 
 def _judge_triad(env: ProbeEnv, inside: Floats) -> list[Way]:
-    touch, sensor = env.touches[-1], env.sensor
+    touch, sensor = env.touches[-1], env.sensors[0]
     meeting = np.append(inside[:2] * env.half_width, 0.0)
     radius = _radius(env)
     noise = sensor.noise
@@ -116,15 +116,17 @@ def _judge_triad(env: ProbeEnv, inside: Floats) -> list[Way]:
 
 
 def _radius(env: ProbeEnv) -> float:
-    if isinstance(env.sensor, FingerSensor):
-        return env.sensor.design.radius
-    return env.sensor.radius if isinstance(env.sensor, BallSensor) else 0.0
+    if isinstance(env.sensors[0], FingerSensor):
+        return env.sensors[0].design.radius
+    return env.sensors[0].radius if isinstance(env.sensors[0], BallSensor) else 0.0
 
 
 def _own_error(env: ProbeEnv, radius: float) -> float:
     """How far off the simulated surface may be, metres; for a tip, half the bound at the most."""
     # Single precision, see `scene.MESH_ROUNDING`, and parts that stray; no bound may be less.
-    return min(1e-6 * env.true_object.diameter + radius / 200.0, env.sensor.noise.position_error)
+    return min(
+        1e-6 * env.true_object.diameter + radius / 200.0, env.sensors[0].noise.position_error
+    )
 
 
 def _first_touch(

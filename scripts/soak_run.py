@@ -94,8 +94,8 @@ class Soak:
             found.interrupted = True
         self._env.reset()
         found.memory.append(resident_memory())
-        if isinstance(self._env, ProbeEnv) and isinstance(self._env.sensor, WatchedFinger):
-            found.tip_depth = self._env.sensor.deepest
+        if isinstance(self._env, ProbeEnv) and isinstance(self._env.sensors[0], WatchedFinger):
+            found.tip_depth = self._env.sensors[0].deepest
         return found
 
     def _begin(self) -> None:

@@ -46,6 +46,12 @@ def touching(env) -> Any:
             return action
 
 
+def say(env, touch) -> None:
+    """Have the last probe have reported something else."""
+    touches = (*env.touches[:-1], touch)
+    env._evidence = replace(env._evidence, touches=touches)
+
+
 def test_the_commands_help_loads_nothing_heavy():
     run = (
         "import sys, palpate.scripts.soak\n"
@@ -111,14 +117,14 @@ def test_a_way_through_the_object_is_found(name):
     action = touching(env)
     ways = judge_last_probe(env, action)
     assert all(way.sound for way in ways)
-    touch = env._touches[-1]
+    touch = env.touches[-1]
     hits = [0]
     if isinstance(env, PlanarProbeEnv):
         farther = 1.01 * touch.end_world - 0.01 * touch.start_world
         env._touches[-1] = replace(touch, end_world=farther)
     else:
         farther = 1.01 * touch.ends_world - 0.01 * touch.starts_world
-        env._touches[-1] = replace(touch, ends_world=farther)
+        say(env, replace(touch, ends_world=farther))
         hits = np.flatnonzero(touch.outcomes == OBJECT).tolist()
     worse = judge_last_probe(env, action)
     for row in hits:
@@ -129,10 +135,10 @@ def test_a_way_through_the_object_is_found(name):
 def test_a_ray_that_says_it_met_nothing_is_not_believed():
     env = made("probe")
     action = touching(env)
-    touch = env._touches[-1]
+    touch = env.touches[-1]
     meeting = np.append(action[:2] * env.half_width, 0.0)
     through = np.tile(meeting, (RAYS, 1))
-    env._touches[-1] = replace(touch, ends_world=through, outcomes=np.full(RAYS, PLANE, np.int8))
+    say(env, replace(touch, ends_world=through, outcomes=np.full(RAYS, PLANE, np.int8)))
     assert not all(way.sound for way in judge_last_probe(env, action))
 
 
@@ -141,19 +147,18 @@ def test_a_line_of_sight_through_the_object_is_found(name):
     env = made(name)
     action = touching(env)
     assert all(way.sound for way in judge_last_probe(env, action))
-    touch = env._touches[-1]
+    touch = env.touches[-1]
     paths = touch.free_space
     farther = 1.02 * paths.ends - 0.02 * paths.starts
-    env._touches[-1] = replace(
-        touch, free_space=FreeSpace(paths.starts, farther, error=paths.error)
-    )
+    say(env, replace(touch, free_space=FreeSpace(paths.starts, farther, error=paths.error)))
     assert not all(way.sound for way in judge_last_probe(env, action))
 
 
 def test_a_watched_finger_touches_as_any_other():
     plain = ProbeEnv(SMALL[1:], sensor="finger", limits=CUT_SHORT)
     watched = ProbeEnv(SMALL[1:], sensor="finger", limits=CUT_SHORT)
-    watched.sensor = finger = WatchedFinger.like(plain.sensor)  # pyright: ignore
+    finger = WatchedFinger.like(plain.sensors[0])  # pyright: ignore
+    watched.sensors = (finger,)
     for env in (plain, watched):
         touching(env)
     for key, value in plain._observe().items():
