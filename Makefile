@@ -18,7 +18,7 @@ PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .NOTPARALLEL:
-.PHONY: help run test check format format-check lint wheel types smoke bench bench-touch soundness assets clean
+.PHONY: help run test check format format-check lint wheel types smoke bench bench-touch soundness soak assets clean
 
 help:
 	@echo "palpate: recognise polyhedra by touch"
@@ -29,6 +29,7 @@ help:
 	@echo "  make bench        measure the recogniser's speed and accuracy"
 	@echo "  make bench-touch  measure how exactly the sensors touch, and how fast"
 	@echo "  make soundness    try 20,000 random cases and more: is the true pose ever lost?"
+	@echo "  make soak         take thousands of random and extreme steps in each environment"
 	@echo "  make format       format the code and repair what lint can repair"
 	@echo "  make assets       rebuild the object library"
 	@echo "  make clean        remove .venv and everything built"
@@ -85,6 +86,9 @@ bench-touch: $(DEV) $(COMPILED)
 soundness: $(DEV) $(COMPILED)
 	@$(BIN)/python -m palpate.scripts.soundness $(ARGS)
 	@$(BIN)/pytest -n auto --maxprocesses 8 -m slow
+
+soak: $(DEV) $(COMPILED)
+	@$(BIN)/python -m palpate.scripts.soak $(ARGS)
 
 format: $(DEV)
 	@$(BIN)/ruff check --fix --quiet . || true
