@@ -241,7 +241,7 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
             self.library, features="all" if every else "faces", tolerance=tolerance, limits=limits
         )
         self._kept_within = KEPT_WITHIN * largest
-        self._use_free_space = use_free_space
+        self.use_free_space = use_free_space
         self._scenes: dict[str, ProbeScene] = {}
         self._max_probes = max_probes
         self._layout = ObservationLayout(
@@ -358,7 +358,7 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
     def _recognize(self, touch: Touch) -> None:
         """Have the belief be that of the evidence, to which a touch was added last."""
         known = self._evidence
-        if not (len(touch.contacts) or self._use_free_space or known.changed):
+        if not (len(touch.contacts) or self.use_free_space or known.changed):
             return
         if not len(known.contacts):
             self._belief = None
@@ -367,7 +367,7 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
         support = self._support
         if self._free and support and not self._placed().stands(support.error):
             support = None  # it leans on something, or rolls: the promise doesn't hold
-        free_space = known.free_space if self._use_free_space else None
+        free_space = known.free_space if self.use_free_space else None
         self._belief = self.recognizer.recognize(
             known.contacts, free_space=free_space, support=support
         )

@@ -33,6 +33,8 @@ class Task:
     """Bound on normals felt, radians."""
     radius: float = 0.0
     """Of what goes along the rays, metres; 0 of a point."""
+    free_space: bool = False
+    """Whether it is evidence too that a ray touched nothing on its way."""
     goal: Goal = "both"
     """What is to be found out: which object it is, how it lies, or both."""
     tolerance: PoseTolerance = field(default_factory=PoseTolerance)

@@ -124,8 +124,8 @@ def episode(
     from ..envs.probe_env import ProbeEnv
     from ..envs.video import check_video_path
     from ..policies import make_policy
+    from .playing import task_of
 
-    chooser = make_policy(policy)
     if not no_picture:
         check_path(picture)
     if video is not None:
@@ -141,6 +141,7 @@ def episode(
         normal_error=float(np.radians(normal_error_deg)),
         max_probes=max_probes,
     )
+    chooser = make_policy(policy, task_of(env))
     console = Console(highlight=False, quiet=json, soft_wrap=True)
     console.print(
         f"An unknown object, one of {len(env.library)},"

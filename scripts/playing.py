@@ -60,6 +60,7 @@ def task_of(env: ProbeEnv, goal: Goal = "both") -> Task:
         radius=_radius(sensor),
         goal=goal,
         tolerance=env.recognizer.tolerance,
+        free_space=env.use_free_space,
     )
 
 

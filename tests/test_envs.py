@@ -19,9 +19,10 @@ from palpate.envs.probe_env import ProbeEnv
 from palpate.envs.ray_sensor import RaySensor
 from palpate.envs.scene import OBJECT, PLANE, ProbeScene
 from palpate.envs.touch import ProbeCommand, triad
-from palpate.policies import RandomProbe
+from palpate.policies import make_policy
 from palpate.recognizer import Polyhedron, SearchLimits, pose_difference
 from palpate.recognizer.rays import cast_rays
+from palpate.scripts.playing import task_of
 
 gymnasium.register_envs(palpate.envs)
 
@@ -394,7 +395,7 @@ def test_the_docstring_names_the_defaults_that_hold():
 
 
 def test_the_random_policy_acts_in_the_box_and_by_its_generator(env):
-    policy = RandomProbe()
+    policy = make_policy("random", task_of(env))
     observation, _ = env.reset(seed=0)
     actions = [policy.act(observation, np.random.default_rng(7)) for _ in range(2)]
     assert np.array_equal(actions[0], actions[1])
