@@ -92,7 +92,7 @@ class ModelTest:
         features: Features | None = None,
         *,
         boxes: int = 2_000,
-        pool: int = 100_000,
+        pool: int = 300_000,
     ) -> None:
         """Prepare a model.
 
@@ -101,7 +101,7 @@ class ModelTest:
             features: what of it contacts may lie on; its faces by default.
             boxes: boxes of rotations to look at before an interpretation is left undecided.
             pool: the same for all interpretations of one call together; a thousand take about
-                fifty milliseconds.
+                ten milliseconds.
         """
         self.boxes, self.pool = boxes, pool
         self.features = features = features or face_features(model)

@@ -11,7 +11,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from .align_kernels import middle_translation
+from .align_kernels import align, middle_translation
+from .backjump_kernels import back_to, due_branch, note_boxes, note_witness, open_branch
 from .cell_kernels import facing
 from .cell_search_kernels import passing_cells, view_cell
 from .compiling import borrowing
@@ -27,6 +28,11 @@ _ONE = np.uint64(1)
 _NONE = np.uint64(0)
 VAGUE = 1.2
 """An angle (radians) of rotations too wide for a verdict within the tree to be worth its time."""
+NARROW = 0.2
+"""An angle (radians) of rotations so narrow that normals alone rule out no more."""
+SPARING, SCARCE = 100, 2.0 / 3.0
+"""Boxes for a leaf once less than so much of the pool is left: most that are rejected at all take
+fewer, and a few that take many do not leave thousands undecided."""
 FEW = 8
 """Completions of a branch that are tried one by one: looking ahead would cost as many verdicts."""
 PATIENCE = 16
@@ -43,6 +49,12 @@ def _larger(array, size):
     grown = np.empty((size,) + array.shape[1:], array.dtype)
     grown[: len(array)] = array
     return grown
+
+
+@borrowing
+def share_of(most_boxes, pool, whole):
+    """How many boxes a leaf may look at, of a pool that was larger once."""
+    return min(most_boxes if pool >= SCARCE * whole else SPARING, most_boxes, pool)
 
 
 @borrowing
@@ -125,9 +137,14 @@ def search_model(
     shifts = np.empty((n + 1, 3))
     angles = np.empty(n + 1)
     rotation, translation = np.empty((3, 3)), np.empty(3)
+    # A leaf in a cell mostly takes more than a sparing share, so that would be wasted on it.
+    whole = 0 if finest > 0.0 else pool
     work = workspace(n)
     stack = box_stack(n)
     row, near, root = np.empty(6), np.empty(3), np.empty((3, 3))
+    spent, due = np.zeros(n + 1), np.zeros(n + 1)
+    found_before = np.zeros(n + 1, np.int64)
+    aligned, branch_turn, branch_shift = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
     held = (np.empty(n, np.int64), np.empty((3, 3)), np.empty((3, 3)), np.empty(3))
     ball = work[6][1]
     nodes = np.zeros(n, np.int64)
@@ -207,6 +224,9 @@ def search_model(
                 )
             posed[start] = -1
             level = start
+            for k in range(start + 1):
+                open_branch(k, spent, due)
+                found_before[k] = found
             untried[level] = left[level, level]
             null_left[level] = nulls[level] < spare
             while level >= start:
@@ -226,6 +246,8 @@ def search_model(
                     break
                 counts[NODES] += 1
                 nodes[level] += 1
+                open_branch(depth, spent, due)
+                found_before[depth] = found
                 empty, completions = check_forward(
                     level,
                     face,
@@ -252,6 +274,13 @@ def search_model(
                 if last >= 0:
                     rotation[:], translation[:] = turns[last], shifts[last]
                     angle = angles[last]
+                    # All normals together may say more than the shorter branch's poses.
+                    if (
+                        angle > NARROW
+                        and not in_cell
+                        and align(depth, faces, model, half_angles, contacts, aligned) < 0.0
+                    ):
+                        continue
                 elif in_cell:
                     rotation[:] = cells[turn]
                     middle_translation(depth, faces, points, middles, rotation, translation)
@@ -290,6 +319,7 @@ def search_model(
                         )
                     if verdict == REJECTED or angle < 0.0:
                         counts[INNER_REJECTED] += 1
+                        note_boxes(depth, 0, spent)
                         continue
                     posed[depth] = depth
                     turns[depth], shifts[depth], angles[depth] = rotation, translation, angle
@@ -351,7 +381,7 @@ def search_model(
                     model,
                     ball,
                     angle,
-                    min(most_boxes, pool),
+                    share_of(most_boxes, pool, whole),
                     rotation,
                     translation,
                     work,
@@ -359,6 +389,36 @@ def search_model(
                 )
                 pool -= looked
                 counts[BOXES] += looked
+                if verdict == FEASIBLE:
+                    note_witness(n, due)
+                else:
+                    note_boxes(n, looked, spent)
+                    branch = n
+                    if due_branch(start, n, spent, due) >= 0:
+                        branch, looked = back_to(
+                            start,
+                            n,
+                            faces,
+                            contacts,
+                            model,
+                            half_angles,
+                            middles,
+                            (cells[turn], cell_angle),
+                            pool,
+                            (spent, due),
+                            branch_turn,
+                            branch_shift,
+                            work,
+                            stack,
+                        )
+                        pool -= looked
+                        counts[BOXES] += looked
+                    if branch < n:
+                        level = branch - 1
+                        if not in_cell:
+                            # What stayed undecided there is rejected with it.
+                            found = found_before[branch]
+                        continue
                 if verdict == REJECTED or (same < found and verdict != FEASIBLE):
                     continue
                 if found == len(found_costs):

@@ -17,6 +17,7 @@ from .feasibility_kernels import seek_feasible
 from .motion_kernels import copy_pose, copy_rotation, move
 from .proof_kernels import locate
 from .reading_kernels import carry, read, worst_on_pieces
+from .turn_kernels import note_turns, open_turns, turn_space
 from .verdict_kernels import BESIDE, EXACT, FEASIBLE, REJECTED, UNDECIDED, judge
 
 STACK = 512
@@ -31,6 +32,9 @@ NEARLY = 1.2
 FINE = 0.05
 """... and in boxes of half a diagonal (radians) below this: then proofs need better weights than a
 few steps of a verdict find. Elsewhere it is slow, and settles little that smaller boxes don't."""
+WIDE = 0.8
+"""Half a diagonal (radians) above which a box is cut without a verdict, which would stay open: of
+such boxes there are never more than a few hundred."""
 FLOOR = 0.02
 """What a weight starts with again in every box."""
 WORTHWHILE = 0.3
@@ -79,7 +83,7 @@ def _copy_weights(count, weights, kept):
 @borrowing
 def _copy_box(count, box, at, chosen, weights, stack):
     """Write a box of the stack to another place of it, with these polygons and weights."""
-    turns, shifts, axes, centres, halves, targets, kept, _ = stack
+    turns, shifts, axes, centres, halves, targets, kept, _, _ = stack
     copy_pose(turns[box], shifts[box], turns[at], shifts[at])
     copy_rotation(axes[box], axes[at])
     for k in range(3):
@@ -88,6 +92,20 @@ def _copy_box(count, box, at, chosen, weights, stack):
     for i in range(count):
         targets[at, i] = chosen[i]
     _copy_weights(count, weights, kept[at])
+
+
+@borrowing
+def _halve(count, top, height, chosen, weights, stack):
+    """Cut a box across its longest side: one half takes its place, the other one the next free."""
+    centres, halves = stack[3], stack[4]
+    longest = 0
+    for k in range(1, 3):
+        if halves[top, k] > halves[top, longest]:
+            longest = k
+    halves[top, longest] *= 0.5
+    _copy_box(count, top, height, chosen, weights, stack)
+    centres[top, longest] -= halves[top, longest]
+    centres[height, longest] += halves[top, longest]
 
 
 @borrowing
@@ -112,7 +130,7 @@ def search_poses(count, faces, contacts, model, angle, most, rotation, translati
     first = model[2]
     readings, region = work[0], work[1]
     x, u, _, weights = work[3]
-    turns, shifts, axes, centres, halves, targets, kept, space = stack
+    turns, shifts, axes, centres, halves, targets, kept, space, facing = stack
     (ball, turned, best_turn), (shifted, best_shift, held, pivot), step = space
     form = work[2][0]
     chosen = targets[STACK]
@@ -137,10 +155,12 @@ def search_poses(count, faces, contacts, model, angle, most, rotation, translati
         centres[0], halves[0] = 0.0, min(angle, np.pi)
     for i in range(count):
         targets[0, i] = faces[i]
+    note_turns(count, faces, contacts, model, facing)
     height = 1
+    looked = 0
     open_boxes = False
     least = np.inf
-    for looked in range(most):
+    while looked < most:
         if height == 0:
             copy_pose(best_turn, best_shift, rotation, translation)
             return (UNDECIDED if open_boxes else REJECTED), looked
@@ -165,9 +185,18 @@ def search_poses(count, faces, contacts, model, angle, most, rotation, translati
                 held[k] += turns[top, a, k] * (pivot[a] - shifts[top, a])
         move(turns[top], shifts[top], step, held, 1.0, rotation, translation)
         box_angle = min(diagonal, np.pi)
-        copy_rotation(rotation, ball)
+        # Each such box is half of one that was looked at or of one of a few wide ones.
+        if not open_turns(count, faces, contacts, model, rotation, box_angle, facing):
+            height = top
+            continue
         for i in range(count):
             chosen[i] = targets[top, i]
+        if diagonal > WIDE and looked > 0 and height < STACK:
+            _halve(count, top, height, chosen, kept[top], stack)
+            height += 1
+            continue
+        copy_rotation(rotation, ball)
+        for i in range(count):
             # Their mean is about 1; none may vanish for good.
             for k in range(2):
                 weights[i, k] = kept[top, i, k] + FLOOR
@@ -185,6 +214,7 @@ def search_poses(count, faces, contacts, model, angle, most, rotation, translati
             translation,
             work,
         )
+        looked += 1
         if outcome == FEASIBLE:
             return FEASIBLE, looked
         if outcome == REJECTED:
@@ -195,7 +225,7 @@ def search_poses(count, faces, contacts, model, angle, most, rotation, translati
             copy_pose(rotation, translation, best_turn, best_shift)
         small = diagonal < FINEST
         _copy_weights(count, weights, kept[top])
-        if outcome == UNDECIDED and (diagonal < FINE or looked % SEEK == 0 or worst < NEARLY):
+        if outcome == UNDECIDED and (diagonal < FINE or looked % SEEK == 1 or worst < NEARLY):
             copy_pose(rotation, translation, turned, shifted)
             outcome = seek_feasible(
                 count, faces, chosen, contacts, model, 60, True, ball, bound, turned, shifted, work
@@ -239,15 +269,8 @@ def search_poses(count, faces, contacts, model, angle, most, rotation, translati
         if _volume(region) < WORTHWHILE * halves[top, 0] * halves[top, 1] * halves[top, 2]:
             copy_pose(rotation, translation, turns[top], shifts[top])
             _box_region(region, axes[top], centres[top], halves[top], form)
-        longest = 0
-        for k in range(1, 3):
-            if halves[top, k] > halves[top, longest]:
-                longest = k
-        halves[top, longest] *= 0.5
         _copy_weights(count, weights, kept[top])
-        _copy_box(count, top, height, chosen, weights, stack)
-        centres[top, longest] -= halves[top, longest]
-        centres[height, longest] += halves[top, longest]
+        _halve(count, top, height, chosen, weights, stack)
         height += 1
     copy_pose(best_turn, best_shift, rotation, translation)
     return UNDECIDED, most
@@ -272,4 +295,5 @@ def box_stack(count):
             (np.empty(3), np.empty(3), np.empty(3), np.empty(3)),
             np.empty(6),
         ),
+        turn_space(count),
     )

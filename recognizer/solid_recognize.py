@@ -48,6 +48,8 @@ FEWEST_FOR_CELLS = 3
 """Contacts from which on cells are worth their time: two leave nearly all rotations possible."""
 MOST_CELLS = 200_000
 """Cells to look at on the way there."""
+SHARE_IN_CELLS = 3
+"""The part of the boxes for leaves that those in cells may take."""
 
 Floats = NDArray[np.float64]
 Bits = NDArray[np.uint64]
@@ -199,6 +201,9 @@ def _search(
     domains: Bits,
 ) -> tuple[Poses, NDArray[np.int64], NDArray[np.int64]]:
     test = entry.test
+    finest = _finest(contacts, test.radius)
+    # Leaves in cells are dear, and a longer search would decide few more of them.
+    pool = test.pool // SHARE_IN_CELLS if finest > 0.0 else test.pool
     *found, nodes, counts = search_kernels.search_model(
         kernel_contacts(contacts),
         contacts.normal_error,
@@ -214,8 +219,8 @@ def _search(
         limits.nodes,
         limits.budget,
         test.boxes,
-        test.pool,
-        _finest(contacts, test.radius),
+        pool,
+        finest,
         MOST_CELLS,
     )
     return Poses(*found), nodes, counts

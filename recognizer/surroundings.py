@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,18 +13,22 @@ from .features import Features
 from .free_space import FreeSpace
 from .polyhedron import Polyhedron
 from .pose import Poses, kernel_contacts
+from .repair import Bounds, repair
 from .slot_kernels import CUTS
 from .support import StableFace, SupportPlane, hull_corners
-from .verdict_kernels import FEASIBLE, REJECTED
+from .verdict_kernels import FEASIBLE, REJECTED, UNDECIDED
 
 Floats = NDArray[np.float64]
 
-GRAIN = 0.05
+GRAIN = 0.005
 """The strictness of the test of a path, as a share of its error: a pose is accepted if it leaves
 the path so much more room than it must."""
 
 POOL = 20_000
 """Boxes of rotations to look at for all interpretations of one call; about a second."""
+
+PROGRAMS = 200
+"""Linear programs to solve for all interpretations of one call; about a second."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,33 +97,99 @@ def clear(
     if not len(poses):
         return poses
     count = len(features)
+    bounds = bounds_of(model, features, contacts, surroundings, standing)
+    cleared = replace(
+        poses,
+        rotations=poses.rotations.copy(),
+        translations=poses.translations.copy(),
+        costs=poses.costs.copy(),
+        informations=poses.informations.copy(),
+    )
+    half_angles = np.concatenate([features.half_angles, np.zeros(2 * CUTS)])
+    verdicts = _clear(cleared, poses.proven, bounds, half_angles, count)
+    stuck = poses.proven & (verdicts == UNDECIDED)
+    if stuck.any():
+        found = _repair(cleared, stuck, bounds)
+        # A witness has nothing to clear; this weighs it, and is a second judge of it.
+        again = _clear(cleared, found, bounds, half_angles, count)
+        verdicts[found & (again == FEASIBLE)] = FEASIBLE
+    proven = verdicts == FEASIBLE
+    return replace(cleared, proven=proven).take(verdicts != REJECTED)
+
+
+def bounds_of(
+    model: Polyhedron,
+    features: Features,
+    contacts: Contacts,
+    surroundings: Surroundings,
+    standing: StableFace | None = None,
+) -> Bounds:
+    """All that a pose of a solid has to meet; arguments as in `clear`."""
     free = surroundings.free_space
     bound = float(np.linalg.norm(model.vertices - model.centroid, axis=1).max())
     spare = [np.zeros((CUTS, 3))] * 2 + [np.full(CUTS, value) for value in (1e-12, 2.0, 1.0)]
     rows = zip(kernel_contacts(contacts), spare, strict=True)
-    rotations, translations = poses.rotations.copy(), poses.translations.copy()
-    costs, informations = poses.costs.copy(), poses.informations.copy()
-    verdicts = clear_poses(
-        poses.faces,
-        poses.proven,
-        tuple(np.concatenate(row) for row in rows),
-        with_slots(features, model.centroid, model.diameter / 2.0),
-        np.concatenate([features.half_angles, np.zeros(2 * CUTS)]),
-        model.face_count,
-        count,
-        bound,
-        (free.starts, free.ends, free.clearance, GRAIN * free.error),
-        _limits(model, surroundings.support, standing),
-        (contacts.approaches, np.where(contacts.approach_known, -np.sin(APPROACH_ERROR), -1.0)),
-        POOL,
-        rotations,
-        translations,
-        costs,
-        informations,
+    return Bounds(
+        contacts=tuple(np.concatenate(row) for row in rows),
+        model=with_slots(features, model.centroid, model.diameter / 2.0),
+        solid_faces=model.face_count,
+        bound=bound,
+        paths=(free.starts, free.ends, free.clearance, GRAIN * free.error),
+        path_scales=free.error,
+        support=_limits(model, surroundings.support, standing),
+        support_scale=surroundings.support.error if surroundings.support else 1.0,
+        approaches=(
+            contacts.approaches,
+            np.where(contacts.approach_known, -np.sin(APPROACH_ERROR), -1.0),
+        ),
     )
-    kept = verdicts != REJECTED
-    proven = verdicts == FEASIBLE
-    return Poses(poses.faces, rotations, translations, costs, informations, proven).take(kept)
+
+
+def _clear(
+    poses: Poses,
+    which: NDArray[np.bool_],
+    bounds: Bounds,
+    half_angles: Floats,
+    features: int,
+) -> NDArray[np.int8]:
+    """`cut_kernels.clear_poses` for some of the poses, changed in place; verdicts of all."""
+    return clear_poses(
+        poses.faces,
+        which,
+        bounds.contacts,
+        bounds.model,
+        half_angles,
+        bounds.solid_faces,
+        features,
+        bounds.bound,
+        bounds.paths,
+        bounds.support,
+        bounds.approaches,
+        POOL,
+        poses.rotations,
+        poses.translations,
+        poses.costs,
+        poses.informations,
+    )
+
+
+def _repair(poses: Poses, stuck: NDArray[np.bool_], bounds: Bounds) -> NDArray[np.bool_]:
+    """Seek witnesses for some of the poses, changed in place; for which one was found."""
+    found = np.zeros(len(poses), bool)
+    left = PROGRAMS
+    for row in np.flatnonzero(stuck):
+        rotation, translation, met, solved = repair(
+            poses.faces[row].astype(np.int64),
+            poses.rotations[row],
+            poses.translations[row],
+            bounds,
+            left,
+        )
+        left -= solved
+        if met:
+            poses.rotations[row], poses.translations[row] = rotation, translation
+            found[row] = True
+    return found
 
 
 def _limits(
