@@ -99,7 +99,7 @@ def _contacts(reader: _RowReader, touched: Sequence[tuple[int, dict[str, str]]])
         return Contacts.none()
     positions = np.array([reader.vector(line, row, POSITION) for line, row in touched])
     normals = np.array([reader.normal(line, row) for line, row in touched])
-    known: NDArray[np.bool_] = ~np.isnan(normals).any(axis=1)
+    known = np.asarray(np.isfinite(normals).all(axis=1), bool)
     position_bounds = [reader.position_bound(line, row) for line, row in touched]
     normal_bounds = [
         reader.normal_bound(line, row) if there else np.pi
