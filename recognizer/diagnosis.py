@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.distance import pdist
 
 from .belief import Belief
@@ -12,6 +13,8 @@ from .contacts import Contacts
 from .free_space import FreeSpace
 from .recognize import Recognizer
 from .support import SupportPlane
+
+Floats = NDArray[np.float64]
 
 SCALES = {
     25.4: "in inches, not millimetres",
@@ -75,11 +78,11 @@ def diagnose(
     if findings or len(contacts) < ENOUGH:
         return findings
     if (contacts.normal_error < np.pi / 2.0).any():
-        belief = recognizer.recognize(_flipped(contacts))
+        belief = recognizer.recognize(_changed(contacts, normals=-contacts.normals))
         if not belief.empty:
             findings.append(Finding("the normals point inwards, not out of the object", belief))
     findings += _other_units(recognizer, contacts)
-    belief = recognizer.recognize(_widened(contacts))
+    belief = recognizer.recognize(_changed(contacts, wider=WIDER))
     if not belief.empty:
         words = f"the bounds are too tight: they fit with bounds {WIDER:g} times as wide"
         findings.append(Finding(words, belief))
@@ -109,37 +112,26 @@ def _other_units(recognizer: Recognizer, contacts: Contacts) -> list[Finding]:
         sizes = [model.diameter for model in recognizer.models]
         if not any(0.2 * size < factor * apart < 1.1 * size for size in sizes):
             continue
-        scaled = Contacts(
-            factor * contacts.positions,
-            contacts.normals,
-            position_error=contacts.position_error,
-            normal_error=contacts.normal_error,
-            approaches=contacts.approaches,
-            kinds=contacts.kinds,
-        )
+        scaled = _changed(contacts, positions=factor * contacts.positions)
         belief = recognizer.recognize(scaled)
         if not belief.empty:
             findings.append(Finding(f"the contacts are {words}, or the library is not", belief))
     return findings
 
 
-def _flipped(contacts: Contacts) -> Contacts:
+def _changed(
+    contacts: Contacts,
+    *,
+    positions: Floats | None = None,
+    normals: Floats | None = None,
+    wider: float = 1.0,
+) -> Contacts:
+    """Contacts with other positions or normals, or bounds so many times as wide."""
     return Contacts(
-        contacts.positions,
-        -contacts.normals,
-        position_error=contacts.position_error,
-        normal_error=contacts.normal_error,
-        approaches=contacts.approaches,
-        kinds=contacts.kinds,
-    )
-
-
-def _widened(contacts: Contacts) -> Contacts:
-    return Contacts(
-        contacts.positions,
-        contacts.normals,
-        position_error=WIDER * contacts.position_error,
-        normal_error=np.minimum(WIDER * contacts.normal_error, np.pi),
+        contacts.positions if positions is None else positions,
+        contacts.normals if normals is None else normals,
+        position_error=wider * contacts.position_error,
+        normal_error=np.minimum(wider * contacts.normal_error, np.pi),
         approaches=contacts.approaches,
         kinds=contacts.kinds,
     )

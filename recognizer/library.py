@@ -22,6 +22,20 @@ def load_folder(folder: str | os.PathLike[str], *, scale: float = 1.0) -> tuple[
         ValueError: no such folder, no mesh in it, two meshes of one name, or a mesh that is no
             closed polyhedron.
     """
+    files = mesh_files(folder)
+    names = [file.stem for file in files]
+    for file in files:
+        if names.count(file.stem) > 1:
+            raise ValueError(f"{file}: another mesh in its folder is called {file.stem!r} too")
+    return tuple(Polyhedron.from_mesh(file, scale=scale) for file in files)
+
+
+def mesh_files(folder: str | os.PathLike[str]) -> list[Path]:
+    """The mesh files of a folder, in alphabetical order.
+
+    Raises:
+        ValueError: no such folder, or no mesh in it.
+    """
     path = Path(folder)
     if not path.is_dir():
         raise ValueError(f"{path}: no such folder")
@@ -30,8 +44,4 @@ def load_folder(folder: str | os.PathLike[str], *, scale: float = 1.0) -> tuple[
         raise ValueError(
             f"{path}: no mesh in this folder; expected files {', '.join(MESH_ENDINGS)}"
         )
-    names = [file.stem for file in files]
-    for file in files:
-        if names.count(file.stem) > 1:
-            raise ValueError(f"{file}: another mesh in its folder is called {file.stem!r} too")
-    return tuple(Polyhedron.from_mesh(file, scale=scale) for file in files)
+    return files

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .recognize import DIGITS, UNITS, USUAL_ERROR
+from .recognize import DIGITS, UNITS, USUAL_ERROR, metres
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -53,26 +53,20 @@ def library(
     from rich.console import Console
     from rich.table import Table
 
-    from ..recognizer.library import MESH_ENDINGS
+    from ..recognizer.library import mesh_files
 
-    if units not in UNITS:
-        raise ValueError(f"units is {units!r}; it must be one of {', '.join(UNITS)}")
-    if not folder.is_dir():
-        raise ValueError(f"{folder}: no such folder")
-    files = sorted(file for file in folder.iterdir() if file.suffix.lower() in MESH_ENDINGS)
-    if not files:
-        raise ValueError(f"{folder}: no mesh in this folder; expected {', '.join(MESH_ENDINGS)}")
+    scale, files = metres(units), mesh_files(folder)
     console = Console(highlight=False, soft_wrap=True)
     console.width = max(console.width, 100)
     table = Table("part", "faces", f"size ({units})", "symmetries", "remarks", box=None)
     models = []
     for file in files:
-        model, remarks = _read(file, UNITS[units])
+        model, remarks = _read(file, scale)
         if model is None:
             table.add_row(file.name, "", "", "", f"[bold]unusable[/]: {remarks}")
             continue
         models.append(model)
-        size = model.diameter / UNITS[units]
+        size = model.diameter / scale
         guess = next((unit for unit, below in GUESSES if size < below), "mm")
         if guess != units:
             remarks = f"{remarks}; is it in {guess}?".removeprefix("; ")
@@ -81,7 +75,7 @@ def library(
         table.add_row(file.name, str(model.face_count), f"{size:.{digits}g}", count, remarks)
     console.print(table)
     if len(models) > 1 and not no_twins:
-        bound = USUAL_ERROR if position_error is None else position_error * UNITS[units]
+        bound = USUAL_ERROR if position_error is None else position_error * scale
         _tell_twins(console, models, units, bound, normal_error_deg)
 
 

@@ -89,9 +89,7 @@ def recognize(
     from ..recognizer import Recognizer, SupportPlane, load_folder, read_contacts
     from ..recognizer.table_cache import default_folder
 
-    if units not in UNITS:
-        raise ValueError(f"units is {units!r}; it must be one of {', '.join(UNITS)}")
-    scale = UNITS[units]
+    scale = metres(units)
     bound = USUAL_ERROR if position_error is None else position_error * scale
     felt = read_contacts(
         contacts, position_error=bound, normal_error=np.radians(normal_error_deg), scale=scale
@@ -116,6 +114,17 @@ def recognize(
     console = Console(highlight=False, soft_wrap=True)
     console.width = max(console.width, WIDTH)
     _tell(console, recognizer, felt, belief, units)
+
+
+def metres(units: str) -> float:
+    """A unit of length in metres.
+
+    Raises:
+        ValueError: it isn't known.
+    """
+    if units not in UNITS:
+        raise ValueError(f"units is {units!r}; it must be one of {', '.join(UNITS)}")
+    return UNITS[units]
 
 
 def _tell(
