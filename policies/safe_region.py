@@ -23,7 +23,7 @@ Floats = NDArray[np.float64]
 
 YAWS, SIDE = 6, 8
 """Directions of triads looked at, and cells of the ray grid along either side of the workspace."""
-THOROUGH = 48
+THOROUGH = 32
 """Cells that are looked at thoroughly, at least."""
 BUDGET = Budget(samples=40)
 """Fewer poses than other strategies have: each is held against all others in many cells."""
