@@ -367,10 +367,15 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
         support = self._support
         if self._free and support and not self._placed().stands(support.error):
             support = None  # it leans on something, or rolls: the promise doesn't hold
-        free_space = known.free_space if self.use_free_space else None
-        self._belief = self.recognizer.recognize(
-            known.contacts, free_space=free_space, support=support
-        )
+        before = self._belief
+        if before is None or known.changed or before.support is not support:
+            free_space = known.free_space if self.use_free_space else None
+            self._belief = self.recognizer.recognize(
+                known.contacts, free_space=free_space, support=support
+            )
+        else:
+            paths = touch.free_space if self.use_free_space else None
+            self._belief = before.update(touch.contacts, free_space=paths)
         self._samples = sample_belief(self._belief, self.library, self._layout.samples)
 
     def _show(self) -> None:

@@ -17,6 +17,7 @@ from .cell_kernels import facing
 from .cell_search_kernels import passing_cells, view_cell
 from .compiling import borrowing
 from .forward_kernels import check_forward, take_lowest
+from .leaf_kernels import place_of, table_of
 from .look_ahead_kernels import drop_beyond_region, drop_rejected
 from .mask_kernels import pair_readings
 from .pose_kernels import finish, settle, start_pose
@@ -156,6 +157,7 @@ def search_model(
     found_costs = np.empty(16)
     found_informations = np.empty((16, 6, 6))
     found_proven = np.empty(16, np.bool_)
+    place, slots = 0, table_of(found_faces, 0)
     between = np.empty((n, n, 3))
     facings = np.empty((n, 3))
     pairs = (packed, half_angles, errors, switches, model[0], readings)
@@ -366,12 +368,11 @@ def search_model(
                 # A pose may be in several cells.
                 same = found
                 if in_cell:
-                    for k in range(found):
-                        if np.all(found_faces[k] == faces):
-                            same = k
-                            break
-                    if same < found and found_proven[same]:
-                        continue
+                    place = place_of(faces, found_faces, slots)
+                    if slots[place] >= 0:
+                        same = slots[place]
+                        if found_proven[same]:
+                            continue
                 counts[LEAVES_TRIED] += 1
                 ball[:] = rotation
                 verdict, looked = settle(
@@ -428,6 +429,11 @@ def search_model(
                     found_costs = _larger(found_costs, 2 * found)
                     found_informations = _larger(found_informations, 2 * found)
                     found_proven = _larger(found_proven, 2 * found)
+                    if in_cell:
+                        slots = table_of(found_faces, found)
+                        place = place_of(faces, found_faces, slots)
+                if in_cell:
+                    slots[place] = same
                 found_costs[same] = finish(
                     n, faces, contacts, model, rotation, translation, work, found_informations[same]
                 )
