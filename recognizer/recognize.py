@@ -215,7 +215,7 @@ class Recognizer:
         known = Surroundings.of(paths, belief.support)
         # Without outliers an interpretation of all contacts is one of the first ones, extended.
         extends = belief.complete and not belief.outliers and len(contacts) > 0
-        if not extends or (belief.support is not None and belief.support.resting):
+        if not extends:
             order = spread_order(everything)
             return self._believe(everything, order, belief.outliers, known, None)
         order = np.concatenate([np.arange(first), first + spread_order(contacts)])

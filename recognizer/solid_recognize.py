@@ -154,7 +154,7 @@ def search_solid(
     settings = (constraints, limits, outliers)
     copies = 1
     if surroundings.support is not None and surroundings.support.resting:
-        poses, nodes, counts = _search_standing(entry, contacts, surroundings, *settings)
+        poses, nodes, counts = _search_standing(entry, contacts, surroundings, *settings, prefixes)
     else:
         smallest = float(contacts.position_error.min())
         permutations, missed = entry.permutations
@@ -233,6 +233,7 @@ def _search_standing(
     constraints: Constraints,
     limits: SearchLimits,
     outliers: int,
+    prefixes: NDArray[np.int32] | None,
 ) -> tuple[Poses, NDArray[np.int64], NDArray[np.int64]]:
     """The search of a solid that stands on a face of its hull: each such face in its turn.
 
@@ -248,7 +249,8 @@ def _search_standing(
     parts: list[Poses] = []
     nodes = np.zeros(len(contacts), np.int64)
     counts = np.zeros(search_kernels.COUNTS, np.int64)
-    start = np.zeros((1, 0), np.int32)
+    # One that stands on either of two faces is there twice.
+    start = np.zeros((1, 0), np.int32) if prefixes is None else np.unique(prefixes, axis=0)
     plain: Poses | None = None
     for index, face in enumerate(entry.stable_faces):
         touch = support.touch(face, entry.model.diameter, contacts, outliers)
@@ -264,8 +266,11 @@ def _search_standing(
             continue
         everything = Contacts.join([touch, contacts])
         domains[0] = _bits(np.array([count + index]), size)
+        # Which face each one stood on isn't kept: any of them.
+        foot = np.full((len(start), 1), count + index, np.int32)
+        known = np.zeros((1, 0), np.int32) if prefixes is None else np.hstack([foot, start])
         poses, some_nodes, some_counts = _search(
-            standing, everything, constraints, limits, outliers, start, domains
+            standing, everything, constraints, limits, outliers, known, domains
         )
         poses = poses.take(poses.faces[:, 0] >= 0)
         poses = clear(entry.model, standing.features, poses, everything, surroundings, face)
