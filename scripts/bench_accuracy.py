@@ -8,24 +8,13 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
+from ..assets.memo import table5
 from ..envs.library import load_library
 from ..envs.probe_env import INCH
 from ..recognizer import Recognizer, pose_difference
 from .bench_limit import mean_pose
 from .bench_report import Case, Row, Section, Settings, draw_cases, noise_of, steps
 
-TABLE_V = (
-    ("simple-hand", 12, 0.01, 2.17, 2.70, 0.08),
-    ("simple-hand", 12, 0.05, 2.08, 2.12, 0.09),
-    ("simple-hand", 10, 0.01, 3.33, 2.68, 0.11),
-    ("simple-hand", 10, 0.05, 3.58, 2.30, 0.12),
-    ("simple-hand", 8, 0.01, 4.43, 2.80, 0.16),
-    ("simple-hand", 8, 0.05, 5.26, 2.48, 0.17),
-    ("housing", 10, 0.05, 3.13, 2.27, 0.13),
-    ("housing", 10, 0.10, 3.77, 2.12, 0.20),
-)
-"""Object; bounds: pi over a number, and inches; mean errors: of the direction of rotation, degrees,
-of its angle, degrees, of the translation, inches. The rows that the scan leaves readable."""
 FEWEST, MOST = 12, 20
 SHARE = 0.1
 """The goal: a tenth of the memo's error of the angle, and of its error of the translation."""
@@ -44,7 +33,9 @@ def measure_accuracy(settings: Settings) -> Section:
     recognizers = {model.name: Recognizer([model]) for model in load_library()}
     fewer = replace(settings, cases=max(settings.cases // 2, 1))
     rows = []
-    for name, pi_over, inches, direction, angle, shift in TABLE_V:
+    for printed in (row for row in table5() if row.sure):
+        name, pi_over, inches = printed.object_name, printed.pi_over, printed.position_error_in
+        direction, angle, shift = printed.direction_deg, printed.angle_deg, printed.translation_in
         fixed, others, least = _errors(
             recognizers[name], pi_over, inches, (FEWEST, MOST), fewer, limit=True
         )

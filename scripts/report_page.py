@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from html import escape
 
@@ -21,6 +21,7 @@ th, td { padding: .3em .7em; border-bottom: 1px solid #ddd; text-align: right;
 th { border-bottom: 2px solid #888; vertical-align: bottom; white-space: normal; }
 th:first-child, td:first-child { text-align: left; }
 tr.best td { background: #eaf3fb; font-weight: 600; }
+tr.marked td { background: #fdf1e3; }
 figure { margin: 1em 0 2em; }
 figure svg { max-width: 100%; height: auto; }
 figcaption { font-size: .9rem; color: #444; max-width: 46rem; }
@@ -41,6 +42,8 @@ class Paragraph:
     """Running text."""
 
     text: str
+    lead: str = ""
+    """Bold words before it, if it has any."""
 
 
 @dataclass(frozen=True)
@@ -65,6 +68,8 @@ class Table:
     rows: Sequence[Sequence[str]]
     best: int | None = None
     """The row that stands out, if one does."""
+    marked: Collection[int] = ()
+    """Rows to be looked at twice."""
 
 
 @dataclass(frozen=True)
@@ -105,16 +110,16 @@ def _markdown(block: Block, prefix: str) -> str:
     match block:
         case Heading(text, level):
             return f"{'#' * level} {text}"
-        case Paragraph(text):
-            return text
+        case Paragraph(text, lead):
+            return f"**{lead}** {text}".rstrip() if lead else text
         case Items(items):
             return "\n".join(f"- {item}" for item in items)
         case Code(text):
             return "\n".join(f"    {line}" for line in text.splitlines())
-        case Table(heads, rows, best):
+        case Table(heads, rows, best, marked):
             ruled = ["---", *["---:"] * (len(heads) - 1)]
             shown = [
-                [f"**{row[0]}**" if number == best else row[0], *row[1:]]
+                [f"**{row[0]}**" if number == best or number in marked else row[0], *row[1:]]
                 for number, row in enumerate(rows)
             ]
             return "\n".join(f"| {' | '.join(row)} |" for row in [list(heads), ruled, *shown])
@@ -126,16 +131,18 @@ def _html(block: Block) -> str:
     match block:
         case Heading(text, level):
             return f"<h{level}>{escape(text)}</h{level}>"
-        case Paragraph(text):
-            return f"<p>{escape(text)}</p>"
+        case Paragraph(text, lead):
+            bold = f"<strong>{escape(lead)}</strong> " if lead else ""
+            return f"<p>{bold}{escape(text)}</p>"
         case Items(items):
             return "<ul>" + "".join(f"<li>{escape(item)}</li>" for item in items) + "</ul>"
         case Code(text):
             return f"<pre>{escape(text)}</pre>"
-        case Table(heads, rows, best):
+        case Table(heads, rows, best, marked):
             lines = ["<tr>" + "".join(f"<th>{escape(head)}</th>" for head in heads) + "</tr>"]
             for number, row in enumerate(rows):
-                mark = ' class="best"' if number == best else ""
+                kind = "best" if number == best else "marked" if number in marked else ""
+                mark = f' class="{kind}"' if kind else ""
                 cells = "".join(f"<td>{escape(cell)}</td>" for cell in row)
                 lines.append(f"<tr{mark}>{cells}</tr>")
             return '<div class="wide"><table>\n' + "\n".join(lines) + "\n</table></div>"
