@@ -22,6 +22,8 @@ from .task import Task
 
 Floats = NDArray[np.float64]
 
+UNFELT = 1e6
+"""A width of the cone of normals beside which any two of them are as good as one."""
 STEPS = 256
 """Of the table of how much two cones overlap: good to 1e-3."""
 
@@ -53,8 +55,21 @@ class Outcomes:
         """Predict the reports of probes; without ``chances`` they are the weights."""
         rays = task.space.rays(actions)
         told = predict(samples, rays, radius=task.radius)
+        return cls.of_predictions(task, samples, actions, rays, told, chances)
+
+    @classmethod
+    def of_predictions(
+        cls,
+        task: Task,
+        samples: PoseSamples,
+        actions: Floats,
+        rays: TriadRays,
+        predictions: Predictions,
+        chances: Floats | None = None,
+    ) -> Outcomes:
+        """Of probes whose reports are predicted; without ``chances`` they are the weights."""
         chances = samples.weights if chances is None else chances
-        return cls(task, samples, actions, rays, told, same_answer(task, samples), chances)
+        return cls(task, samples, actions, rays, predictions, same_answer(task, samples), chances)
 
     def thoroughly(self, rows: NDArray[np.int64]) -> Outcomes:
         """Some of the probes, looked at thoroughly."""
@@ -97,7 +112,7 @@ class Outcomes:
         Noise is uniform in a ball and a cone. A point felt is then off its face by a distance ``x``
         of density ``1 - x^2`` within the bound, and a normal is likely to be within the cone of
         another by how much the two cones, as discs, overlap. A pose stands if it explains what was
-        felt by all three rays. Bounds are widened by the poses' own spread.
+        felt by all rays. Bounds are widened by the poses' own spread.
 
         Returns:
             (a, s, s): row the true pose, column the one that stands; 1 for pairs with the same
@@ -158,10 +173,15 @@ class Outcomes:
     def _compared(self) -> tuple[Any, ...]:
         """What the kernels hold against each other, probe by probe, in single precision."""
         told = self.predictions
-        bits = (told.outcomes == MET_OBJECT) << np.arange(3)
+        bits = (told.outcomes == MET_OBJECT) << np.arange(told.outcomes.shape[2])
         slopes = np.abs(np.einsum("sakx,akx->sak", told.normals_world, self.rays.directions_world))
         turns = self.samples.rotation_spread**2
         cones = self.task.normal_error + np.sqrt(turns[:, None] + turns)
+        # Twice a cone is at most all directions there are; of normals that aren't felt, none
+        # is told from another.
+        widths = 2.0 * np.sin(np.minimum(cones, 0.5 * np.pi))
+        if self.task.normal_error >= np.pi:
+            widths[:] = UNFELT
         return (
             np.ascontiguousarray(bits.sum(axis=2).T, np.uint8),
             _by_probe(told.depths),
@@ -170,8 +190,7 @@ class Outcomes:
             _by_probe(told.normals_world),
             self.same,
             np.float32(self.task.position_error),
-            # Twice a cone is at most all directions there are.
-            (2.0 * np.sin(np.minimum(cones, 0.5 * np.pi))).astype(np.float32),
+            widths.astype(np.float32),
             self.task.free_space,
         )
 
@@ -194,7 +213,7 @@ def _joined(
 
 
 def _by_probe(values: Floats) -> NDArray[np.float32]:
-    """(s, a, 3, ...) as (a, 3, s, ...)."""
+    """(s, a, k, ...) as (a, k, s, ...)."""
     return np.ascontiguousarray(np.moveaxis(values, 0, 2), np.float32)
 
 

@@ -73,7 +73,8 @@ def information_of(
     reach, chord = np.asarray(reach), 2.0 * np.sin(0.5 * np.asarray(cone))
     grown = 5.0 / reach[..., None, None] ** 2 * rows[..., :, None] * rows[..., None, :]
     across = np.eye(3) - normals_world[..., :, None] * normals_world[..., None, :]
-    grown[..., :3, :3] += 4.0 / (chord[..., None, None] * placed.radius) ** 2 * across
+    felt = np.asarray(cone)[..., None, None] < np.pi
+    grown[..., :3, :3] += felt * 4.0 / (chord[..., None, None] * placed.radius) ** 2 * across
     return grown
 
 

@@ -131,7 +131,11 @@ def weighed(task: Task, observation: Observation, budget: Budget) -> PoseSamples
     A share of the weights is the same for every hypothesis, the rest is that of the belief: an
     episode ends when no rival is left, however unlikely.
     """
-    samples = thinned(task.samples(observation), budget.samples)
+    return evened(thinned(task.samples(observation), budget.samples))
+
+
+def evened(samples: PoseSamples) -> PoseSamples:
+    """Samples of which no hypothesis weighs next to nothing: `EVEN` of the weights is shared."""
     if not len(samples):
         return samples
     numbers, own, count = np.unique(samples.hypotheses, return_inverse=True, return_counts=True)

@@ -63,7 +63,8 @@ def read_contacts(
     normal there; ``position_error`` and ``normal_error`` (radians), bounds that stand before those
     given here; ``sx,sy,sz``, where the probe started from, so that the way to the contact was free;
     ``ex,ey,ez``, on a row without a contact, where it ended without touching anything; ``kind``:
-    face, edge or vertex. Commas, semicolons (then with decimal commas, too) and tabs part them.
+    face, edge or vertex. Commas, semicolons (then with decimal commas, too), tabs and blanks part
+    them.
 
     Of a ball tip the start may be its centre's and the contact the point on the surface: the line
     between is inside what the ball swept.
@@ -229,7 +230,9 @@ def _table(path: Path) -> list[tuple[int, dict[str, str]]]:
         raise ValueError(f"{path}: the file is empty; its first line must name the columns")
     header = next(line for line in text.splitlines() if line.strip())
     parting = max((";", "\t", ","), key=header.count)
-    lines = csv.reader(io.StringIO(text), delimiter=parting)
+    if parting not in header:
+        parting = " "
+    lines = csv.reader(io.StringIO(text), delimiter=parting, skipinitialspace=parting == " ")
     names: list[str] = []
     rows = []
     for cells in lines:
@@ -241,8 +244,10 @@ def _table(path: Path) -> list[tuple[int, dict[str, str]]]:
             _check_header(path, names)
             continue
         if len(cells) > len(names) and any(cells[len(names) :]):
+            hint = "; decimal commas need semicolons between columns" if parting == "," else ""
             raise ValueError(
-                f"{path}, line {lines.line_num}: {len(cells)} values under {len(names)} columns"
+                f"{path}, line {lines.line_num}: {len(cells)} values under {len(names)}"
+                f" columns{hint}"
             )
         if parting != ",":
             cells = [cell.replace(",", ".") for cell in cells]

@@ -28,6 +28,8 @@ SCALES = {
 """What a length is multiplied by that was written in one unit and read in another."""
 WIDER = 3.0
 """How much wider bounds are tried."""
+BLURRED = 0.02
+"""Share of the contacts' distance that bounds are widened to, at most, with other units."""
 ENOUGH = 4
 """Contacts below which anything fits somewhere, so that a fit says nothing."""
 
@@ -40,6 +42,8 @@ class Finding:
     """What seems to be wrong, as a clause."""
     belief: Belief
     """Of the changed contacts."""
+    contact: int | None = None
+    """The place of the one contact that it is about, if it is about one."""
 
 
 def diagnose(
@@ -91,7 +95,7 @@ def diagnose(
         if not belief.empty:
             row = int(np.flatnonzero(belief.hypotheses[0].interpretations[0] < 0)[0])
             words = f"contact {row + 1} is on something else: the others fit without it"
-            findings.append(Finding(words, belief))
+            findings.append(Finding(words, belief, contact=row))
     return findings
 
 
@@ -112,10 +116,18 @@ def _other_units(recognizer: Recognizer, contacts: Contacts) -> list[Finding]:
         sizes = [model.diameter for model in recognizer.models]
         if not any(0.2 * size < factor * apart < 1.1 * size for size in sizes):
             continue
-        scaled = _changed(contacts, positions=factor * contacts.positions)
-        belief = recognizer.recognize(scaled)
-        if not belief.empty:
-            findings.append(Finding(f"the contacts are {words}, or the library is not", belief))
+        # If it is the library that has other units, bounds grow with the contacts.
+        largest = BLURRED * factor * apart / float(contacts.position_error.max())
+        for blur in (1.0, max(min(factor, largest), 1.0)):
+            scaled = _changed(contacts, positions=factor * contacts.positions, blur=blur)
+            belief = recognizer.recognize(scaled)
+            if not belief.empty:
+                size = f"{factor:.4g} times too small"
+                if factor < 1.0:
+                    size = f"{1.0 / factor:.4g} times too large"
+                told = f"the contacts are {size}: they are {words}, or the library is not"
+                findings.append(Finding(told, belief))
+                break
     return findings
 
 
@@ -125,12 +137,13 @@ def _changed(
     positions: Floats | None = None,
     normals: Floats | None = None,
     wider: float = 1.0,
+    blur: float = 1.0,
 ) -> Contacts:
-    """Contacts with other positions or normals, or bounds so many times as wide."""
+    """Contacts with other positions or normals, or wider bounds (``blur``: on positions)."""
     return Contacts(
         contacts.positions if positions is None else positions,
         contacts.normals if normals is None else normals,
-        position_error=wider * contacts.position_error,
+        position_error=wider * blur * contacts.position_error,
         normal_error=np.minimum(wider * contacts.normal_error, np.pi),
         approaches=contacts.approaches,
         kinds=contacts.kinds,

@@ -36,9 +36,12 @@ def edge_neighbours(triangles: Ints) -> Ints:
     shared_by = np.diff(np.r_[first, len(ends)])
     if (shared_by != 2).any():
         holes, crowded = int((shared_by == 1).sum()), int((shared_by > 2).sum())
+        mending = "it has holes; 'fill holes' or 'repair' in a CAD or mesh program closes them"
+        if not holes:
+            mending = "surfaces meet inside it; 'make solid' or 'union' in a CAD program joins them"
         raise ValueError(
             f"the mesh isn't closed: {holes} edges belong to one triangle only"
-            f" and {crowded} to more than two; each must belong to two"
+            f" and {crowded} to more than two; each must belong to two ({mending})"
         )
     return np.column_stack([owner[first], owner[first + 1], ends[first]])
 

@@ -38,6 +38,8 @@ def mesh_files(folder: str | os.PathLike[str]) -> list[Path]:
     """
     path = Path(folder)
     if not path.is_dir():
+        if path.is_file():
+            raise ValueError(f"{path} is a file; give the folder that it is in: {path.parent}")
         raise ValueError(f"{path}: no such folder")
     files = sorted(file for file in path.iterdir() if file.suffix.lower() in MESH_ENDINGS)
     if not files:

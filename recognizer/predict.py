@@ -17,7 +17,8 @@ from .ray_targets import RayTargets
 Floats = NDArray[np.float64]
 
 MET_PLANE, MET_OBJECT = 0, 1
-"""What a ray is predicted to meet; triads all go down, so there is always the plane."""
+"""What a ray is predicted to meet; triads all go down, so there is always the plane. Of a ray with
+an end of its own, MET_PLANE is that it got there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,20 +55,22 @@ class PoseSamples:
 
 @dataclass(frozen=True, eq=False)
 class Predictions:
-    """What each of ``s`` poses says each of ``a`` triads would meet."""
+    """What each of ``s`` poses says the ``k`` rays of each of ``a`` probes would meet."""
 
     outcomes: NDArray[np.int8]
-    """(s, a, 3) MET_OBJECT or MET_PLANE."""
+    """(s, a, k) MET_OBJECT or MET_PLANE."""
     depths: Floats
-    """(s, a, 3) metres from where the ray starts to what it meets."""
+    """(s, a, k) metres from where the ray starts to what it meets."""
     normals_world: Floats
-    """(s, a, 3, 3) outward unit normals there; the plane's is up."""
+    """(s, a, k, 3) outward unit normals there; the plane's is up."""
     depth_spread: Floats
-    """(s, a, 3) standard deviation of the depth by that of the pose, metres; zero on the plane."""
+    """(s, a, k) standard deviation of the depth by that of the pose, metres; zero on the plane."""
 
 
-def predict(samples: PoseSamples, rays: TriadRays, *, radius: float = 0.0) -> Predictions:
-    """Cast triads against every pose.
+def predict(
+    samples: PoseSamples, rays: TriadRays, *, radius: float = 0.0, ends: Floats | None = None
+) -> Predictions:
+    """Cast probes against every pose.
 
     A pose that shifts by ``s`` and turns by ``w`` about the centroid ``c`` changes the depth at
     which a ray along ``d`` meets a face with normal ``n`` at ``x`` by
@@ -76,10 +79,12 @@ def predict(samples: PoseSamples, rays: TriadRays, *, radius: float = 0.0) -> Pr
 
     Args:
         samples: the poses.
-        rays: the triads; they start outside the objects.
+        rays: those of the probes; they start outside the objects.
         radius: of a ball that goes along the rays, metres. Depths are then of its centre where it
             meets the plane of the face that its centre's ray meets; on an edge, where it would
             touch both faces or a neighbour first, that is off by up to about the radius.
+        ends: (a, k) the depth at which each ray ends if it meets no object, metres: MET_PLANE is
+            then that it met nothing. Without it rays go down, and end on the plane z = 0.
 
     Raises:
         ValueError: a radius below zero.
@@ -89,7 +94,10 @@ def predict(samples: PoseSamples, rays: TriadRays, *, radius: float = 0.0) -> Pr
     starts = np.ascontiguousarray(rays.starts_world.reshape(-1, 3))
     directions = np.ascontiguousarray(rays.directions_world.reshape(-1, 3))
     count, many = len(samples), len(starts)
-    plane = (radius - starts[:, 2]) / directions[:, 2]
+    if ends is None:
+        plane = (radius - starts[:, 2]) / directions[:, 2]
+    else:
+        plane = np.ascontiguousarray(ends, np.float64).reshape(-1)
     # Neighbours in a block look the same way, so that whole blocks turn their back on a face.
     order = np.argsort(np.arctan2(directions[:, 1], directions[:, 0]))
     outcomes = np.full((count, many), MET_PLANE, np.int8)
@@ -122,7 +130,7 @@ def predict(samples: PoseSamples, rays: TriadRays, *, radius: float = 0.0) -> Pr
             (outcomes, depths, normals, spread),
             space,
         )
-    shape = (count, many // 3, 3)
+    shape = (count, *rays.starts_world.shape[:-1])
     return Predictions(
         outcomes.reshape(shape),
         depths.reshape(shape),

@@ -17,12 +17,12 @@ MOST_YAW = np.pi / 3.0
 
 @dataclass(frozen=True, eq=False)
 class TriadRays:
-    """The rays of a number of triads."""
+    """The rays of a number of probes: ``k`` each, three of a triad, one of a straight touch."""
 
     starts_world: Floats
-    """(a, 3, 3) where each of a triad's three rays starts, metres."""
+    """(a, k, 3) where each ray starts, metres."""
     directions_world: Floats
-    """(a, 3, 3) unit directions."""
+    """(a, k, 3) unit directions."""
 
 
 @dataclass(frozen=True)

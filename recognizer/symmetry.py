@@ -63,13 +63,13 @@ def rotational_symmetries(faces: FaceSummary, corners: Floats, diameter: float) 
     sines = np.linalg.norm(np.cross(faces.normals[first], faces.normals), axis=1)
     slanted = sines > 0.5 * sines.max()
     second = int(np.where(slanted, alike.sum(axis=1), len(alike) + 1).argmin())
-    frame = _frame(faces.normals[first], faces.normals[second])
+    frame = leaning_frame(faces.normals[first], faces.normals[second])
     tree = KDTree(corners)
     found = [np.eye(3)]
     for image in np.flatnonzero(alike[first]):
         fits = alike[second] & (np.abs(cosines[image] - cosines[first, second]) < 1e-3)
         for other in np.flatnonzero(fits):
-            rotation = _frame(faces.normals[image], faces.normals[other]) @ frame.T
+            rotation = leaning_frame(faces.normals[image], faces.normals[other]) @ frame.T
             new = all(np.abs(rotation - known).max() > 1e-3 for known in found)
             if new and _maps_onto_itself(rotation, faces, alike, tree, slack):
                 found.append(rotation)
@@ -117,7 +117,7 @@ def _maps_onto_itself(
     return bool(matches.any(axis=1).all() and matches.any(axis=0).all())
 
 
-def _frame(a: Floats, b: Floats) -> Floats:
+def leaning_frame(a: Floats, b: Floats) -> Floats:
     """A right-handed orthonormal frame, in columns, that leans on two directions."""
     across = np.cross(a, b)
     across /= np.linalg.norm(across)

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import RigidTransform
+from scipy.spatial.transform import RigidTransform, Rotation
 
 from .contacts import Contacts
 from .polyhedron import Polyhedron
 from .recognize import Recognizer
+from .symmetry import LENGTH_TOLERANCE, leaning_frame
 
 Floats = NDArray[np.float64]
 
@@ -85,6 +87,48 @@ def near_twins(
             for name, laid in poses.items()
         ]
         yield sorted(found, key=lambda twins: -twins.share)
+
+
+def same_parts(models: Sequence[Polyhedron]) -> list[tuple[str, str]]:
+    """Pairs of models that are one part, anyhow turned and shifted: two files of it.
+
+    A mirror image is another part.
+    """
+    return [
+        (one.name, other.name)
+        for one, other in combinations(models, 2)
+        if one.face_count == other.face_count and _can_be_laid_over(one, other)
+    ]
+
+
+def _can_be_laid_over(one: Polyhedron, other: Polyhedron) -> bool:
+    slack = LENGTH_TOLERANCE * one.diameter
+    if abs(one.diameter - other.diameter) > slack:
+        return False
+    first, second = (np.sort(model.areas) for model in (one, other))
+    if np.abs(first - second).max() > slack * one.diameter:
+        return False
+    points, _ = sample_surface(one, POINTS // 4, np.random.default_rng(0))
+    return any(
+        surface_distances(other, pose.apply(points)).max() < slack
+        for pose in _layings(one, other, slack)
+    )
+
+
+def _layings(one: Polyhedron, other: Polyhedron, slack: float) -> Iterator[RigidTransform]:
+    """Poses of a part that put two of its faces on two of the other's that look like them."""
+    first = int(one.areas.argmax())
+    leaning = np.linalg.norm(np.cross(one.normals[first], one.normals), axis=1)
+    second = int(leaning.argmax())
+    cosines = other.normals @ other.normals.T
+    alike = np.abs(other.areas - one.areas[[[first], [second]]]) < slack * one.diameter
+    pairs = alike[0][:, None] & alike[1]
+    pairs &= np.abs(cosines - one.normals[first] @ one.normals[second]) < 1e-3
+    frame = leaning_frame(one.normals[first], one.normals[second])
+    for image, beside in np.argwhere(pairs):
+        turn = leaning_frame(other.normals[image], other.normals[beside]) @ frame.T
+        shift = other.centroid - turn @ one.centroid
+        yield RigidTransform.from_components(shift, Rotation.from_matrix(turn))
 
 
 def _held_against(

@@ -17,6 +17,8 @@ from .library import library
 from .recognize import recognize
 from .report import report
 from .reproduce import reproduce
+from .suggest import suggest
+from .view import view
 
 __all__ = ["app", "main"]
 
@@ -29,6 +31,8 @@ app = typer.Typer(
 )
 app.command()(episode)
 app.command()(recognize)
+app.command()(suggest)
+app.command()(view)
 app.command()(library)
 app.command()(benchmark)
 app.command()(report)

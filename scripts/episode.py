@@ -94,6 +94,15 @@ def episode(
             show_default=False,
         ),
     ] = None,
+    html: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE.html",
+            help="Write a page to look at: the episode in 3-D, probe by probe, and the tree as it"
+            " was pruned. One file, opens offline in a browser. [dim]default: no page[/]",
+            show_default=False,
+        ),
+    ] = None,
     no_picture: Annotated[bool, typer.Option("--no-picture", help="Draw nothing.")] = False,
     position_error: Annotated[
         float,
@@ -130,6 +139,10 @@ def episode(
         check_path(picture)
     if video is not None:
         check_video_path(video)
+    if html is not None:
+        from .page import check_page_path
+
+        check_page_path(html)
     env = ProbeEnv(
         library,
         object_name=object_name,
@@ -159,6 +172,12 @@ def episode(
         _draw(env, ruled_out, picture, console)
     if video is not None:
         _film(record, video, console)
+    if html is not None:
+        from .page import write_page
+        from .story_episode import episode_story
+
+        size = write_page(episode_story(record), html)
+        console.print(f"page: {html}, {1e-6 * size:.1f} MB, opens in a browser")
 
 
 def _play(
@@ -169,22 +188,18 @@ def _play(
 
     from ..envs.episode_picture import likeness_of
     from ..envs.film_script import EpisodeRecord, Probed
+    from .playing import probes
 
-    # The policy's stream is the seed's child: it never meets the environment's own.
-    rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(1)[0])
     console.print(
         f"{'probe':<8}  {'its rays met':<20}  interpretations  hypotheses left", style="dim"
     )
-    observation, _ = env.reset(seed=seed)
+    env.reset(seed=seed)  # as `probes` does
     began_at = env.T_world_object
-    probes: list[Probed] = []
+    probed: list[Probed] = []
     ruled_out: list[tuple[Hypothesis, str]] = []
-    ended = False
-    while not ended:
-        before = env.belief
-        action = chooser.act(observation, rng)
-        observation, _, terminated, truncated, _ = env.step(action)
-        ended = terminated or truncated
+    before = env.belief
+    for one in probes(env, chooser, seed):
+        probed.append(one)
         console.print(probe_line(len(env.touches), env.touches[-1], env.belief))
         moved = env.touches[-1].displacement
         if moved.distance > TOLD_PUSH:
@@ -193,12 +208,12 @@ def _play(
                 f" {np.degrees(moved.turn):.2f}°; {len(env.contacts)} contacts still hold",
                 style="dim",
             )
-        probes.append(Probed(env.touches[-1], env.contacts, env.belief, env.T_world_object))
         if before and env.belief and before is not env.belief:
             ruled_out = _ruled_out(env, before, env.belief) + ruled_out
+        before = env.belief
     return (
         EpisodeRecord(
-            env.true_object, began_at, tuple(probes), likeness_of(env), verdict_in_short(env)
+            env.true_object, began_at, tuple(probed), likeness_of(env), verdict_in_short(env)
         ),
         ruled_out,
     )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .recognize import DIGITS, UNITS, USUAL_ERROR, metres
+from .own_parts import DIGITS, UNITS, USUAL_ERROR, metres
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -125,7 +125,7 @@ def _tell_twins(
                 console.print(f"  {one.part} and {one.other} are the same part")
             continue
         place = " ".join(f"{value / UNITS[units]:.{DIGITS[units]}g}" for value in one.place)
-        normal = " ".join(f"{-value:.2f}" for value in one.normal)
+        normal = " ".join(f"{-value:z.2f}" for value in one.normal)
         console.print(
             f"  {one.part} is taken for {one.other} in {one.share:.0%} of draws; they differ by"
             f" {one.apart / UNITS[units]:.3g} {units} where {one.part} has ({place}):"

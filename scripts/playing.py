@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from time import perf_counter, process_time
 
@@ -9,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..envs.ball_sensor import BallSensor
+from ..envs.film_script import Probed
 from ..envs.finger_sensor import FingerSensor
 from ..envs.probe_env import REACH, ProbeEnv
 from ..envs.touch import Sensor
@@ -85,6 +87,24 @@ def make_env(setting: Setting) -> ProbeEnv:
         normal_error=setting.noise.normal_error,
         max_probes=setting.max_probes,
     )
+
+
+def probes(env: ProbeEnv, policy: Policy, seed: int) -> Iterator[Probed]:
+    """Play an episode until the environment ends it, probe by probe.
+
+    Args:
+        env: its episode starts when the first probe is asked for.
+        policy: what chooses the probes.
+        seed: of object, pose and noise; the strategy's stream is a child of it, and never meets
+            the environment's own.
+    """
+    rng = np.random.default_rng(np.random.SeedSequence(seed).spawn(1)[0])
+    observation, _ = env.reset(seed=seed)
+    ended = False
+    while not ended:
+        observation, _, terminated, truncated, _ = env.step(policy.act(observation, rng))
+        ended = terminated or truncated
+        yield Probed(env.touches[-1], env.contacts, env.belief, env.T_world_object)
 
 
 def play(env: ProbeEnv, policy: Policy, job: Job) -> EpisodeRow:

@@ -8,6 +8,24 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from .own_parts import (
+    DIGITS,
+    UNITS,
+    WIDTH,
+    ContactsFile,
+    Edges,
+    Json,
+    Library,
+    NormalErrorDeg,
+    Outliers,
+    PlaneHeight,
+    PositionError,
+    Resting,
+    Units,
+    metres,
+    read_given,
+)
+
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
@@ -16,66 +34,31 @@ if TYPE_CHECKING:
 
 __all__ = ["recognize"]
 
-UNITS = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
-USUAL_ERROR = 1e-4
-"""Bound on positions where none is given, metres: a tenth of a millimetre."""
+MOST_COMPARED = 50
+"""Parts that are looked at for two that are the same."""
 SHOWN = 10
 """Hypotheses in the table."""
-WIDTH = 110
-"""Columns of text that the table takes; a narrower terminal wraps it."""
-DIGITS = {"mm": 3, "cm": 4, "m": 6, "in": 4}
 
 
 def recognize(
-    contacts: Annotated[
-        Path,
-        typer.Argument(
-            metavar="CONTACTS.csv",
-            help="A line for each touch, under a header: x,y,z and, where known, nx,ny,nz (the"
-            " outward normal), position_error, normal_error (radians), sx,sy,sz (where the probe"
-            " came from), kind (face, edge, vertex). A line with sx,sy,sz and ex,ey,ez alone is a"
-            " way on which nothing was touched.",
-        ),
-    ],
-    library: Annotated[
-        Path,
-        typer.Option(metavar="FOLDER", help="A folder of closed meshes (OBJ, OFF, PLY or STL)."),
-    ],
-    units: Annotated[
-        str, typer.Option(metavar="mm|cm|m|in", help="Of the meshes, the contacts and the options.")
-    ] = "mm",
-    position_error: Annotated[
-        float | None,
+    contacts: ContactsFile,
+    library: Library,
+    units: Units = "mm",
+    position_error: PositionError = None,
+    normal_error_deg: NormalErrorDeg = 15.0,
+    plane: PlaneHeight = None,
+    resting: Resting = False,
+    outliers: Outliers = 0,
+    edges: Edges = False,
+    html: Annotated[
+        Path | None,
         typer.Option(
-            metavar="E",
-            help="Each point is within this of the truth, in those units."
-            " [dim]default: 0.1 mm, or what the file says[/]",
+            metavar="FILE.html",
+            help="Write a page to look at, touch by touch; opens offline in a browser.",
             show_default=False,
         ),
     ] = None,
-    normal_error_deg: Annotated[
-        float,
-        typer.Option(metavar="A", help="Each normal is within this of the truth, degrees."),
-    ] = 15.0,
-    plane: Annotated[
-        float | None,
-        typer.Option(
-            metavar="Z",
-            help="The part doesn't reach below this height.",
-            show_default=False,
-        ),
-    ] = None,
-    resting: Annotated[
-        bool, typer.Option("--resting", help="It stands on that plane (--plane, or 0).")
-    ] = False,
-    outliers: Annotated[
-        int, typer.Option(metavar="K", min=0, help="Up to so many touches were of something else.")
-    ] = 0,
-    edges: Annotated[
-        bool,
-        typer.Option("--edges", help="Touches may be on edges and corners, as a ball tip's are."),
-    ] = False,
-    json: Annotated[bool, typer.Option("--json", help="Print one JSON document instead.")] = False,
+    json: Json = False,
 ) -> None:
     """Say which part of a library was touched, and where it lies.
 
@@ -83,74 +66,57 @@ def recognize(
     undetermined, or not in this library. Poses take the part's own coordinates to those of the
     contacts.
     """
-    import numpy as np
     from rich.console import Console
 
-    from ..recognizer import Recognizer, SupportPlane, load_folder, read_contacts
+    from ..recognizer import Recognizer
     from ..recognizer.table_cache import default_folder
 
-    scale = metres(units)
-    bound = USUAL_ERROR if position_error is None else position_error * scale
-    felt = read_contacts(
-        contacts, position_error=bound, normal_error=np.radians(normal_error_deg), scale=scale
+    if html is not None:
+        from .page import check_page_path
+
+        check_page_path(html)
+    given = read_given(
+        contacts,
+        library,
+        units=units,
+        position_error=position_error,
+        normal_error_deg=normal_error_deg,
+        plane=plane,
+        resting=resting,
+        edges=edges,
     )
-    if not len(felt.contacts):
+    felt = given.felt
+    if felt is None or not len(felt.contacts):
         raise ValueError(f"{contacts}: no contact in it, only ways that met nothing")
-    support = None
-    if plane is not None or resting:
-        height = 0.0 if plane is None else plane * scale
-        support = SupportPlane(height=height, error=bound, resting=resting)
-    recognizer = Recognizer(
-        load_folder(library, scale=scale),
-        features="all" if edges or (felt.contacts.kinds > 1).any() else "faces",
-        cache=default_folder(),
-    )
+    recognizer = Recognizer(given.models, features=given.features, cache=default_folder())
     belief = recognizer.recognize(
-        felt.contacts, outliers=outliers, free_space=felt.free_space, support=support
+        felt.contacts, outliers=outliers, free_space=felt.free_space, support=given.support
     )
+    console = Console(highlight=False, soft_wrap=True, quiet=json)
     if json:
         print(json_format.dumps(_document(recognizer, belief, units), indent=2))
-        return
-    console = Console(highlight=False, soft_wrap=True)
-    console.width = max(console.width, WIDTH)
-    _tell(console, recognizer, felt, belief, units)
+    else:
+        console.width = max(console.width, WIDTH)
+        _tell(console, recognizer, felt, belief, units)
+    if html is not None:
+        from .page import write_page
+        from .story_contacts import Beliefs, contacts_story
 
-
-def metres(units: str) -> float:
-    """A unit of length in metres.
-
-    Raises:
-        ValueError: it isn't known.
-    """
-    if units not in UNITS:
-        raise ValueError(f"units is {units!r}; it must be one of {', '.join(UNITS)}")
-    return UNITS[units]
+        told = Beliefs.of(felt, belief)
+        story = contacts_story(contacts.name, recognizer, told, (units, metres(units)))
+        console.print(
+            f"\npage: {html}, {1e-6 * write_page(story, html):.1f} MB, opens in a browser"
+        )
 
 
 def _tell(
     console: Console, recognizer: Recognizer, felt: FeltFile, belief: Belief, units: str
 ) -> None:
     """The answer for a person to read."""
-    from ..recognizer.verdict import Verdict, verdict
-
-    misses = f" and {felt.misses} ways that met nothing" if felt.misses else ""
-    console.print(
-        f"{len(felt.contacts)} contacts{misses}, {len(recognizer.models)} parts in the library."
-    )
-    word, found = verdict(belief), belief.hypotheses
-    if word is Verdict.UNKNOWN:
-        _tell_why_nothing_fits(console, recognizer, belief)
+    tell_verdict(console, felt, belief)
+    found = belief.hypotheses
+    if not found:
         return
-    parts = list(dict.fromkeys(hypothesis.object_name for hypothesis in found))
-    said = {
-        Verdict.UNIQUE: f"[bold]It is {parts[0]}[/], and this is how it lies.",
-        Verdict.AMBIGUOUS: f"[bold]Ambiguous[/]: {len(found)} poses of {_some(parts)} fit alike.",
-        Verdict.UNDERDETERMINED: f"[bold]Underdetermined[/]: {len(found)} ways for {_some(parts)}"
-        " to lie fit, and some leave it free to shift or turn. Touch other faces.",
-        Verdict.CUT_SHORT: "[bold]Cut short[/]: so many interpretations fit that not all were"
-        " looked at. More contacts, or tighter bounds, help.",
-    }
-    console.print(said[word])
     console.print(_table(found[:SHOWN], recognizer, units))
     if len(found) > SHOWN:
         console.print(f"… and {len(found) - SHOWN} more (--json lists all)")
@@ -158,13 +124,57 @@ def _tell(
     console.print(_matrix(found[0], units))
 
 
+def tell_verdict(console: Console, felt: FeltFile, belief: Belief) -> None:
+    """What there is, what it amounts to, and if nothing fits, why that may be."""
+    from ..recognizer.verdict import Verdict, verdict
+
+    misses = f" and {felt.misses} ways that met nothing" if felt.misses else ""
+    console.print(
+        f"{len(felt.contacts)} contacts{misses}, {len(belief.recognizer.models)} parts in the"
+        " library."
+    )
+    word, found = verdict(belief), belief.hypotheses
+    if not found:
+        if word is Verdict.UNKNOWN:
+            _tell_why_nothing_fits(console, felt, belief)
+        else:
+            console.print(
+                "[bold]Cut short[/]: nothing was found before a budget ran out, which rules nothing"
+                " out. More contacts, or tighter bounds, help."
+            )
+        return
+    parts = list(dict.fromkeys(hypothesis.object_name for hypothesis in found))
+    ways, fit = ("1 way", "fits") if len(found) == 1 else (f"{len(found)} ways", "fit")
+    said = {
+        Verdict.UNIQUE: f"[bold]It is {parts[0]}[/], and its pose is fixed.",
+        Verdict.AMBIGUOUS: f"[bold]Ambiguous[/]: {len(found)} poses of {_some(parts)} fit alike.",
+        Verdict.UNDERDETERMINED: f"[bold]Underdetermined[/]: {ways} for {_some(parts)} to lie"
+        f" {fit}, with freedom left to shift or turn. Touch other faces.",
+        Verdict.CUT_SHORT: "[bold]Cut short[/]: so many interpretations fit that not all were"
+        " looked at. More contacts, or tighter bounds, help.",
+    }
+    console.print(said[word])
+    if word is not Verdict.UNIQUE:
+        _tell_same_parts(console, belief, parts)
+
+
+def _tell_same_parts(console: Console, belief: Belief, parts: list[str]) -> None:
+    """Say which of the parts left are one in two files: no touch tells these apart."""
+    from ..recognizer.twins import same_parts
+
+    models = [model for model in belief.recognizer.models if model.name in parts[:MOST_COMPARED]]
+    for one, other in same_parts(models):
+        console.print(f"{one} and {other} are the same part, in two files: remove one of them.")
+
+
 def _some(parts: list[str]) -> str:
     return ", ".join(parts[:4]) + (f" and {len(parts) - 4} others" if len(parts) > 4 else "")
 
 
-def _tell_why_nothing_fits(console: Console, recognizer: Recognizer, belief: Belief) -> None:
+def _tell_why_nothing_fits(console: Console, felt: FeltFile, belief: Belief) -> None:
     from ..recognizer.diagnosis import diagnose, too_far_apart
 
+    recognizer = belief.recognizer
     console.print("[bold]Not in this library[/]: no part fits these contacts.")
     times = too_far_apart(recognizer, belief.contacts)
     if times is not None:
@@ -172,7 +182,8 @@ def _tell_why_nothing_fits(console: Console, recognizer: Recognizer, belief: Bel
     paths = belief.free_space if len(belief.free_space) else None
     for finding in diagnose(recognizer, belief.contacts, free_space=paths, support=belief.support):
         best = finding.belief.hypotheses[0].object_name
-        console.print(f"Perhaps {finding.explanation} (then {best} fits).")
+        line = "" if finding.contact is None else f", line {felt.rows[finding.contact]} of the file"
+        console.print(f"Perhaps {finding.explanation} (then {best} fits{line}).")
 
 
 def _table(found: tuple[Hypothesis, ...], recognizer: Recognizer, units: str) -> Table:
