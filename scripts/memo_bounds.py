@@ -74,7 +74,7 @@ def _section(nodes: Mapping[str, Floats], counts: Sequence[Counts], trials: int)
     inches, degrees = NOISE.position_error / 0.0254, np.degrees(NOISE.normal_error)
     return Section(
         name="bounds",
-        title="How many interpretations to expect",
+        title="Section 6: how many interpretations to expect",
         place="Section 6, Propositions 1 to 3 and their corollaries",
         asked=(
             "How many interpretations of the first k contacts does the distance between contacts"

@@ -47,7 +47,7 @@ def _section(rows: Sequence[PoseErrorRow], errors: Sequence[Errors], trials: int
     outside = [f"{', '.join(row.key)}: {row.why}" for row in compared if row.verdict == "outside"]
     return Section(
         name="table5",
-        title="How far off the computed pose is",
+        title="Table V: how far off the computed pose is",
         place="Section 3 and Section 4.3, Table V",
         asked=(
             "Once each contact has been given the right face, how far is the pose that is computed"

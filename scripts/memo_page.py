@@ -205,6 +205,9 @@ def _section(section: Section) -> list[Block]:
 
 
 def _made(command: str) -> list[Block]:
+    from .benchmark_config import versions
+
+    made_with = ", ".join(f"{name} {value}" for name, value in json.loads(versions()).items())
     return [
         Heading("How this page was made"),
         Paragraph(
@@ -212,6 +215,7 @@ def _made(command: str) -> list[Block]:
             " all but running times comes out the same on any number of processors."
         ),
         Code(command),
+        Paragraph(f"Made with {made_with}."),
     ]
 
 

@@ -68,7 +68,7 @@ def _section(views: Sequence[RangeRow], outcomes: Sequence[Outcome], seed: int) 
     sure = np.degrees(np.concatenate([one.sure for one in outcomes]))
     return Section(
         name="range",
-        title="Range data",
+        title="Section 5: range data",
         place="Section 5, Figure 9",
         asked=(
             "Does the method work on a real sensor's data? The memo took two dense range images of"

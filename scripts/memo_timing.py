@@ -82,7 +82,7 @@ def _section(
     )
     return Section(
         name="timing",
-        title="Time to prune and to test",
+        title="Section 7: time to prune and to test",
         place="Section 7",
         asked=(
             "How long does it take to grow and prune the tree, and how long to test the"

@@ -164,9 +164,7 @@ def command(experiments: Sequence[str] | None, trials: int | None, seed: int) ->
     words = ["palpate", "reproduce", *(experiments or [EVERYTHING])]
     if trials is not None:
         words += ["--trials", f"{trials}"]
-    if seed:
-        words += ["--seed", f"{seed}"]
-    return " ".join([*words, "--out", "FOLDER"])
+    return " ".join([*words, "--seed", f"{seed}", "--out", "FOLDER"])
 
 
 def _checked(experiments: Sequence[str]) -> list[str]:
