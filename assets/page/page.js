@@ -165,8 +165,10 @@ function follow() {
 if (view) view.resize();
 tell(story);
 if (view) view.reset();
-if (!fromHash()) setTime(live ? story.last : 0);
+// An episode plays; of a person's own touches the answer is what is looked for.
+const plays = !live && story.truth !== null;
+if (!fromHash()) setTime(plays ? 0 : story.last);
 refresh();
-if (!live && !location.hash) page.playing = !window.matchMedia("(prefers-reduced-motion: reduce)").matches;
+if (plays && !location.hash) page.playing = !window.matchMedia("(prefers-reduced-motion: reduce)").matches;
 requestAnimationFrame(frame);
 if (live) follow();
