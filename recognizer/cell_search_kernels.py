@@ -2,7 +2,8 @@
 
 Cells are cut finer where they pass, down to an angle at which a contact can't turn far against its
 bound. A cell is dropped only if the tree of pairs, grown in it, has no leaf: any pose within the
-bounds whose rotation is in the cell would have its interpretation there.
+bounds whose rotation is in the cell would have its interpretation there. A branch of the first
+contact that has no leaf in a cell has none in any part of it, so parts don't grow it again.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from .cell_kernels import facing
 from .compiling import borrowing
 from .forward_kernels import check_forward, take_lowest
 
+_ONE = np.uint64(1)
 TRIES = 400
 """Branches after which a cell passes without an answer."""
 
@@ -50,14 +52,17 @@ def view_cell(rotation, points, normals, between, facings):
 
 
 @borrowing
-def _passes(contacts, model, domains, spare, pairs, cell, facings, space):
-    """Whether some interpretation passes all pairs in a cell, or none was excluded in time."""
+def _passes(contacts, model, domains, first, spare, pairs, cell, facings, space):
+    """Whether some interpretation passes all pairs in a cell, or none was excluded in time.
+
+    Features of the first contact whose branches have no leaf are dropped from (w,) ``first``.
+    """
     left, sizes, untried, faces, nulls, null_left, near = space
     n, words = domains.shape
     lost = 0
     for j in range(n):
         for w in range(words):
-            left[0, j, w] = domains[j, w]
+            left[0, j, w] = domains[j, w] if j > 0 else first[w]
         sizes[0, j] = facing(
             facings[j], contacts[3][j], contacts[4][j], cell[1], model, left[0, j], near
         )
@@ -69,8 +74,14 @@ def _passes(contacts, model, domains, spare, pairs, cell, facings, space):
     null_left[0] = spare > 0
     for w in range(words):
         untried[0, w] = left[0, 0, w]
+        first[w] = left[0, 0, w]
+    grown = -1
     while level >= 0:
+        if level == 0 and grown >= 0:
+            first[grown >> 6] &= ~(_ONE << np.uint64(grown & 63))
         face = take_lowest(untried[level])
+        if level == 0:
+            grown = face
         if face < 0:
             if not null_left[level]:
                 level -= 1
@@ -129,7 +140,8 @@ def passing_cells(
         most: cells to look at; then what is left is not cut further.
 
     Returns:
-        (c, 3, 3) rotations, object to world, and (c,) angles: each rotation of a cell is within it.
+        (c, 3, 3) rotations, object to world; (c,) angles: each rotation of a cell is within it;
+        (c, w) the features that the first contact may be on there.
     """
     (n, words), features = domains.shape, packed.shape[2]
     space = (
@@ -145,6 +157,7 @@ def passing_cells(
     between, facings, rotation = np.empty((n, n, 3)), np.empty((n, 3)), np.empty((3, 3))
     # Breadth first, so that a budget ends on cells of one size.
     middles, half = np.zeros((1, 3)), np.pi
+    firsts = domains[:1].copy()
     looked = 0
     passed = 1
     while True:
@@ -153,7 +166,7 @@ def passing_cells(
             break
         half *= 0.5
         angle = np.sqrt(3.0) * half + 1e-9
-        cut = np.empty((8 * passed, 3))
+        cut, left_to_first = np.empty((8 * passed, 3)), np.empty((8 * passed, words), np.uint64)
         kept = 0
         for p in range(passed):
             for corner in range(8):
@@ -166,17 +179,28 @@ def passing_cells(
                 if nearest > np.pi**2:
                     continue
                 looked += 1
+                left_to_first[kept] = firsts[p]
                 if angle < np.pi:
                     rotation_of(cut[kept], rotation)
                     view_cell(rotation, contacts[0], contacts[1], between, facings)
                     cell = (between, angle)
-                    if not _passes(contacts, model, domains, spare, pairs, cell, facings, space):
+                    if not _passes(
+                        contacts,
+                        model,
+                        domains,
+                        left_to_first[kept],
+                        spare,
+                        pairs,
+                        cell,
+                        facings,
+                        space,
+                    ):
                         continue
                 kept += 1
-        middles, passed = cut[:kept].copy(), kept
+        middles, firsts, passed = cut[:kept].copy(), left_to_first[:kept].copy(), kept
         if passed == 0:
             break
     rotations = np.empty((passed, 3, 3))
     for p in range(passed):
         rotation_of(middles[p], rotations[p])
-    return rotations, np.full(passed, min(np.sqrt(3.0) * half + 1e-9, np.pi))
+    return rotations, np.full(passed, min(np.sqrt(3.0) * half + 1e-9, np.pi)), firsts

@@ -12,6 +12,17 @@ from .reading_kernels import ARC, NO_CONE, carry, read
 
 
 @borrowing
+def _along_edge(corners, first, along):
+    """The unit vector from an edge's first corner to its second, into the head of ``along``."""
+    square = 0.0
+    for k in range(3):
+        along[k] = corners[first + 1, k] - corners[first, k]
+        square += along[k] * along[k]
+    for k in range(3):
+        along[k] /= np.sqrt(square)
+
+
+@borrowing
 def assemble_fit(bounded, count, faces, x, u, model, contacts, readings, system, gradient, space):
     """Normal equations of the least-squares misfit at one pose; returns the misfit.
 
@@ -20,8 +31,8 @@ def assemble_fit(bounded, count, faces, x, u, model, contacts, readings, system,
     a vertex every distance counts.
 
     Args:
-        bounded: whether lying outside a face counts. It holds a fit to the faces, but only from
-            one side, so it isn't information about the pose.
+        bounded: whether lying outside a face, or beyond the end of an edge, counts. It holds a fit
+            to them, but only from one side, so it isn't information about the pose.
         count: how many contacts count.
         faces: (n,) the feature of each contact, -1 for none.
         x: (n, 3) contacts, object frame.
@@ -36,7 +47,8 @@ def assemble_fit(bounded, count, faces, x, u, model, contacts, readings, system,
     normals, start, centre, radius = model[0], model[3], model[5], model[6]
     _, _, reaches, chords, sines = contacts
     gaps, lengths, heights, regions, kinds, misses, directions = readings
-    row, _, _, turn, arm, direction = space
+    corners = model[4]
+    row, along, _, turn, arm, direction = space
     system[:] = 0.0
     gradient[:] = 0.0
     cost = 0.0
@@ -58,11 +70,19 @@ def assemble_fit(bounded, count, faces, x, u, model, contacts, readings, system,
             cost += weight * height * height
         if not solid and regions[i] == CORNER:
             cost += weight * lengths[i] * lengths[i]
+            one_sided = not bounded and start[f + 1] - start[f] == 2
+            if one_sided:
+                _along_edge(corners, start[f], along)
             for k in range(3):
                 direction[:] = 0.0
                 direction[k] = 1.0
+                gap = gaps[i, k]
+                if one_sided:
+                    for a in range(3):
+                        direction[a] -= along[k] * along[a]
+                        gap -= along[k] * along[a] * gaps[i, a]
                 slope_row(direction, arm, radius, turn, row)
-                add_row(row, gaps[i, k], weight, system, gradient)
+                add_row(row, gap, weight, system, gradient)
         elif regions[i] != INSIDE and (bounded or not solid):
             squared = lengths[i] * lengths[i] - height * height
             outside = np.sqrt(max(squared, 0.0))

@@ -121,22 +121,42 @@ def cluster(
     # noise hardly any fit is off by more.
     allowed = min(tolerance.rotation * radius, most_shift)
     hypotheses, log_weights = [], np.empty(len(leaders))
+    loose = 3.0 * np.sqrt(variances) > allowed
     for group, leader in enumerate(leaders):
         members = np.flatnonzero(groups == group)
-        open_motions = 3.0 * np.sqrt(variances[leader]) > allowed
         hypotheses.append(
             Hypothesis(
                 object_name=model.name,
                 T_world_object=_matrix(poses.rotations[leader], poses.translations[leader]),
                 weight=1.0,
                 interpretations=poses.faces[members],
-                freedoms=motions[leader].T[open_motions],
+                freedoms=_open_motions(leader, members, loose, motions, poses.rotations),
                 covariance=covariances[leader].astype(float),
                 proven=bool(poses.proven[leader]),
             )
         )
         log_weights[group] = np.logaddexp.reduce(log_shares[members])
     return hypotheses, log_weights
+
+
+def _open_motions(
+    leader: np.intp,
+    members: NDArray[np.intp],
+    loose: NDArray[np.bool_],
+    motions: Floats,
+    rotations: Floats,
+) -> Floats:
+    """(d, 6) what the leader of a group leaves open, or else what one of its other members does.
+
+    Any of them may be the true one, so that a pose is fixed only if each fixes it.
+    """
+    for member in (leader, *members):
+        if loose[member].any():
+            # In the leader's frame: members may be turned by a symmetry of the object.
+            turn = rotations[leader].T @ rotations[member]
+            rows = motions[member].T[loose[member]].reshape(-1, 2, 3)
+            return rows.reshape(-1, 6) if member == leader else (rows @ turn.T).reshape(-1, 6)
+    return np.zeros((0, 6))
 
 
 def _matrix(rotation: Floats, translation: Floats) -> Floats:

@@ -162,7 +162,7 @@ def search_model(
     facings = np.empty((n, 3))
     pairs = (packed, half_angles, errors, switches, model[0], readings)
     in_cell = finest > 0.0
-    cells, cell_angles = np.empty((1, 3, 3)), np.zeros(1)
+    cells, cell_angles, firsts = np.empty((1, 3, 3)), np.zeros(1), domains[:1].copy()
     if in_cell:
         left[0] = domains
         # What is known of the first contacts says where to look.
@@ -172,7 +172,7 @@ def search_model(
                 f = prefixes[m, i]
                 if f >= 0:
                     left[0, i, f >> 6] |= _ONE << np.uint64(f & 63)
-        cells, cell_angles = passing_cells(
+        cells, cell_angles, firsts = passing_cells(
             contacts,
             errors,
             model,
@@ -191,8 +191,12 @@ def search_model(
             cell_angle = cell_angles[turn]
             view_cell(cells[turn], points, contacts[1], between, facings)
         for m in range(len(prefixes)):
+            if start > 0 and prefixes[m, 0] >= 0:
+                f = prefixes[m, 0]
+                if firsts[turn, f >> 6] & (_ONE << np.uint64(f & 63)) == _NONE:
+                    continue
             for j in range(n):
-                left[start, j] = domains[j]
+                left[start, j] = domains[j] if j > 0 else firsts[turn]
                 sizes[start, j] = features
             if in_cell:
                 for j in range(start, n):

@@ -283,6 +283,12 @@ def test_no_episode_loses_the_truth(setting: str) -> None:
     assert played.contacts > 0
 
 
+@pytest.mark.parametrize("index", [384, 417])
+def test_a_contact_beyond_the_end_of_an_edge_does_not_fix_a_pose_along_it(index: int) -> None:
+    # Once the end of an edge counted from both sides, and these ended 7 and 8 mm off.
+    assert not play("ball/resting", 20, index).wrong
+
+
 def test_the_settings_are_every_sensor_in_every_placement() -> None:
     # Planar has a placement of its own, and only a finger moves what is free.
     assert len(SETTINGS) == 3 * len(SENSOR_NAMES) + 2
