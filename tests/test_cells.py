@@ -12,7 +12,7 @@ from palpate.recognizer.pose import kernel_contacts
 
 FINEST = 0.2
 MOST = 200_000
-EVERY = 60
+EVERY = 25
 """Cases of a solid."""
 
 
