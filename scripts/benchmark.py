@@ -196,26 +196,13 @@ def _under_a_bar(
 ) -> Iterator:
     """Pass rows on; each counts once it has been kept."""
     from rich.console import Console
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeElapsedColumn,
-        TimeRemainingColumn,
-    )
+    from rich.progress import Progress
 
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TextColumn("left:"),
-        TimeRemainingColumn(),
-    )
+    from .progress_bar import columns
+
     console = console or Console(quiet=True)
     with Progress(
-        *columns, console=console, auto_refresh=False, disable=not console.is_terminal
+        *columns(), console=console, auto_refresh=False, disable=not console.is_terminal
     ) as bar:
         task = bar.add_task("episodes", total=total, completed=done)
         bar.refresh()

@@ -79,25 +79,12 @@ def _leave_interrupts() -> None:
 def _under_a_bar(
     results: Iterable[Result], total: int, label: str, console: Console
 ) -> Iterator[Result]:
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeElapsedColumn,
-        TimeRemainingColumn,
-    )
+    from rich.progress import Progress
 
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        TextColumn("left:"),
-        TimeRemainingColumn(),
-    )
+    from .progress_bar import columns
+
     shown = console.is_terminal
-    with Progress(*columns, console=console, transient=True, disable=not shown) as bar:
+    with Progress(*columns(), console=console, transient=True, disable=not shown) as bar:
         task = bar.add_task(label, total=total)
         for result in results:
             bar.advance(task)
