@@ -14,6 +14,7 @@ from numba import njit
 from .cell_kernels import facing
 from .compiling import borrowing
 from .forward_kernels import check_forward, take_lowest
+from .room_kernels import DIRECTIONS, enter, view_ways
 
 _ONE = np.uint64(1)
 TRIES = 400
@@ -52,12 +53,12 @@ def view_cell(rotation, points, normals, between, facings):
 
 
 @borrowing
-def _passes(contacts, model, domains, first, spare, pairs, cell, facings, space):
+def _passes(contacts, model, domains, first, spare, pairs, cell, facings, slabs, space):
     """Whether some interpretation passes all pairs in a cell, or none was excluded in time.
 
     Features of the first contact whose branches have no leaf are dropped from (w,) ``first``.
     """
-    left, sizes, untried, faces, nulls, null_left, near = space
+    left, sizes, untried, faces, nulls, null_left, near, rooms, ways = space
     n, words = domains.shape
     lost = 0
     for j in range(n):
@@ -70,6 +71,8 @@ def _passes(contacts, model, domains, first, spare, pairs, cell, facings, space)
     if lost > spare:
         return False
     level, tries = 0, 0
+    for k in range(len(DIRECTIONS)):
+        rooms[0, k, 0], rooms[0, k, 1] = -np.inf, np.inf
     nulls[0] = 0
     null_left[0] = spare > 0
     for w in range(words):
@@ -93,6 +96,11 @@ def _passes(contacts, model, domains, first, spare, pairs, cell, facings, space)
         tries += 1
         if tries > TRIES:
             return True
+        if face < 0:
+            for k in range(len(DIRECTIONS)):
+                rooms[depth, k, 0], rooms[depth, k, 1] = rooms[level, k, 0], rooms[level, k, 1]
+        elif not enter(ways[level], slabs[face], rooms[level], rooms[depth]):
+            continue
         empty, _ = check_forward(
             level,
             face,
@@ -127,6 +135,7 @@ def passing_cells(
     spare,
     switches,
     readings,
+    slabs,
     finest,
     most,
 ):
@@ -136,6 +145,7 @@ def passing_cells(
         contacts: see `search_kernels.search_model`, as are those that follow but ...
         domains: (n, w) bit sets, the features that each contact may be on.
         readings: (n, n, 9) see `mask_kernels.pair_readings`.
+        slabs: see `room_kernels.feature_slabs`.
         finest: an angle, radians; cells of less are not cut further.
         most: cells to look at; then what is left is not cut further.
 
@@ -152,6 +162,8 @@ def passing_cells(
         np.zeros(n + 1, np.int64),
         np.zeros(n, np.bool_),
         np.empty(3),
+        np.empty((n + 1, len(DIRECTIONS), 2)),
+        np.empty((n, len(DIRECTIONS), 2)),
     )
     pairs = (packed, half_angles, errors, switches, model[0], readings)
     between, facings, rotation = np.empty((n, n, 3)), np.empty((n, 3)), np.empty((3, 3))
@@ -183,6 +195,7 @@ def passing_cells(
                 if angle < np.pi:
                     rotation_of(cut[kept], rotation)
                     view_cell(rotation, contacts[0], contacts[1], between, facings)
+                    view_ways(contacts[0], contacts[2], rotation, angle, space[8])
                     cell = (between, angle)
                     if not _passes(
                         contacts,
@@ -193,6 +206,7 @@ def passing_cells(
                         pairs,
                         cell,
                         facings,
+                        slabs,
                         space,
                     ):
                         continue

@@ -13,15 +13,17 @@ from numba import njit
 
 from .align_kernels import align, middle_translation
 from .backjump_kernels import back_to, due_branch, note_boxes, note_witness, open_branch
-from .cell_kernels import facing
 from .cell_search_kernels import passing_cells, view_cell
 from .compiling import borrowing
 from .forward_kernels import check_forward, take_lowest
 from .leaf_kernels import place_of, table_of
+from .lean_kernels import lean_space, leans
 from .look_ahead_kernels import drop_beyond_region, drop_rejected
 from .mask_kernels import pair_readings
 from .pose_kernels import finish, settle, start_pose
+from .prefix_kernels import begin, face_cell
 from .proof_kernels import locate, workspace
+from .room_kernels import DIRECTIONS, enter, feature_slabs, view_ways
 from .search_pose_kernels import box_stack
 from .verdict_kernels import FEASIBLE, REJECTED, judge
 
@@ -162,26 +164,32 @@ def search_model(
     facings = np.empty((n, 3))
     pairs = (packed, half_angles, errors, switches, model[0], readings)
     in_cell = finest > 0.0
+    known, allowed = domains.copy(), domains.copy()
+    allowed_sizes = np.full(n, features)
+    slabs = feature_slabs(model)
+    lean_work = lean_space(n)
+    rooms = np.empty((n + 1, len(DIRECTIONS), 2))
+    ways = np.empty((n, len(DIRECTIONS), 2))
     cells, cell_angles, firsts = np.empty((1, 3, 3)), np.zeros(1), domains[:1].copy()
     if in_cell:
-        left[0] = domains
         # What is known of the first contacts says where to look.
-        left[0, :start] = _NONE
+        known[:start] = _NONE
         for m in range(len(prefixes)):
             for i in range(start):
                 f = prefixes[m, i]
                 if f >= 0:
-                    left[0, i, f >> 6] |= _ONE << np.uint64(f & 63)
+                    known[i, f >> 6] |= _ONE << np.uint64(f & 63)
         cells, cell_angles, firsts = passing_cells(
             contacts,
             errors,
             model,
             half_angles,
             packed,
-            left[0].copy(),
+            known,
             spare,
             switches,
             readings,
+            slabs,
             finest,
             most_cells,
         )
@@ -190,44 +198,26 @@ def search_model(
         if in_cell:
             cell_angle = cell_angles[turn]
             view_cell(cells[turn], points, contacts[1], between, facings)
+            view_ways(points, contacts[2], cells[turn], cell_angle, ways)
+            allowed[:] = known
+            allowed[0] = firsts[turn]
+            face_cell(contacts, model, facings, cell_angle, allowed, allowed_sizes, near)
         for m in range(len(prefixes)):
-            if start > 0 and prefixes[m, 0] >= 0:
-                f = prefixes[m, 0]
-                if firsts[turn, f >> 6] & (_ONE << np.uint64(f & 63)) == _NONE:
-                    continue
-            for j in range(n):
-                left[start, j] = domains[j] if j > 0 else firsts[turn]
-                sizes[start, j] = features
-            if in_cell:
-                for j in range(start, n):
-                    sizes[start, j] = facing(
-                        facings[j],
-                        contacts[3][j],
-                        contacts[4][j],
-                        cell_angle,
-                        model,
-                        left[start, j],
-                        near,
-                    )
-            nulls[start] = 0
-            for i in range(start):
-                f = prefixes[m, i]
-                faces[i] = f
-                if f < 0:
-                    nulls[start] += 1
-                    continue
-                check_forward(
-                    i,
-                    f,
-                    start,
-                    n,
-                    pairs,
-                    (between, cell_angle),
-                    left[start],
-                    sizes[start],
-                    left[start],
-                    sizes[start],
-                )
+            nulls[start] = begin(
+                prefixes[m],
+                pairs,
+                (between, cell_angle),
+                ways,
+                slabs,
+                allowed,
+                allowed_sizes,
+                faces,
+                left[start],
+                sizes[start],
+                rooms[start],
+            )
+            if nulls[start] < 0:
+                continue
             posed[start] = -1
             level = start
             for k in range(start + 1):
@@ -254,6 +244,10 @@ def search_model(
                 nodes[level] += 1
                 open_branch(depth, spent, due)
                 found_before[depth] = found
+                if face < 0:
+                    rooms[depth] = rooms[level]
+                elif in_cell and not enter(ways[level], slabs[face], rooms[level], rooms[depth]):
+                    continue
                 empty, completions = check_forward(
                     level,
                     face,
@@ -371,6 +365,18 @@ def search_model(
                     continue
                 # A pose may be in several cells.
                 same = found
+                if not leans(
+                    n,
+                    faces,
+                    contacts,
+                    errors,
+                    model,
+                    half_angles,
+                    cells[turn],
+                    cell_angle,
+                    lean_work,
+                ):
+                    continue
                 if in_cell:
                     place = place_of(faces, found_faces, slots)
                     if slots[place] >= 0:
