@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import io
 import os
+import pickle
 import sys
 from collections.abc import Callable, Iterable, Iterator
-from functools import cache, partial
+from dataclasses import replace
+from functools import cache, lru_cache, partial
 from importlib import import_module
 from itertools import islice
 from typing import TYPE_CHECKING, Any
@@ -15,6 +18,7 @@ from .benchmark_row import EpisodeRow
 
 if TYPE_CHECKING:
     from ..envs.probe_env import ProbeEnv
+    from .playing import Opening
 
 BACKENDS = ("joblib", "ray")
 AHEAD = 2
@@ -95,10 +99,55 @@ def _play_job(folder: str, job: Job) -> EpisodeRow:
     from .playing import play, task_of
 
     _warm_up(job.policy)
-    env = environment(job.setting)
+    opening = _opening(job)
     # A fresh one for each episode: whatever it remembers, rows don't depend on who played before.
-    policy = make_policy(job.policy, task_of(env, job.setting.goal))
-    return play(env, policy, job)
+    policy = make_policy(job.policy, task_of(opening.env, job.setting.goal))
+    return play(opening, policy, job)
+
+
+class _Sparing(pickle.Pickler):
+    """Leaves out what never changes: tables are most of an environment."""
+
+    def __init__(self, file: io.BytesIO, env: ProbeEnv) -> None:
+        super().__init__(file, pickle.HIGHEST_PROTOCOL)
+        self._places = {id(one): place for place, one in enumerate(_unchanging(env))}
+
+    def persistent_id(self, obj: object) -> int | None:
+        return self._places.get(id(obj))
+
+
+class _Restoring(pickle.Unpickler):
+    """Puts it in again."""
+
+    def __init__(self, file: io.BytesIO, env: ProbeEnv) -> None:
+        super().__init__(file)
+        self._unchanging = _unchanging(env)
+
+    def persistent_load(self, pid: int) -> object:
+        return self._unchanging[pid]
+
+
+def _unchanging(env: ProbeEnv) -> list[object]:
+    return [env.recognizer, *env.library]
+
+
+def _opening(job: Job) -> Opening:
+    """The beginning of a job's episode, a copy of its own.
+
+    What is felt first is the same for every strategy, and often takes longest to make sense of.
+    """
+    kept = _kept_opening(replace(job, number=0, policy=""))
+    return _Restoring(io.BytesIO(kept), environment(job.setting)).load()
+
+
+@lru_cache(maxsize=1)  # the strategies of an episode come one after another
+def _kept_opening(job: Job) -> bytes:
+    from .playing import open_episode
+
+    env = environment(job.setting)
+    kept = io.BytesIO()
+    _Sparing(kept, env).dump(open_episode(env, job))
+    return kept.getvalue()
 
 
 def look_in(folder: str) -> None:
@@ -124,8 +173,9 @@ def _warm_up(policy_name: str) -> None:
     """Let what happens once a process (imports, kernels that load) happen outside the clock."""
     from ..policies import make_policy
     from .benchmark_config import parse_noise
-    from .playing import play, task_of
+    from .playing import open_episode, play, task_of
 
     setting = Setting("simple-hand", parse_noise("pi/10,0.01in"), "ray", "across", "both", 3)
     env = environment(setting)
-    play(env, make_policy(policy_name, task_of(env)), Job(0, setting, policy_name, 0, 0))
+    job = Job(0, setting, policy_name, 0, 0)
+    play(open_episode(env, job), make_policy(policy_name, task_of(env)), job)

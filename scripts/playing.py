@@ -107,8 +107,22 @@ def probes(env: ProbeEnv, policy: Policy, seed: int) -> Iterator[Probed]:
         yield Probed(env.touches[-1], env.contacts, env.belief, env.T_world_object)
 
 
-def play(env: ProbeEnv, policy: Policy, job: Job) -> EpisodeRow:
-    """Play an episode until the goal is reached, nothing fits, or no probe is left.
+@dataclass
+class Opening:
+    """An episode after its first probe, which no strategy has a say in."""
+
+    env: ProbeEnv
+    observation: dict[str, NDArray[np.generic]]
+    rng: np.random.Generator
+    first: NDArray[np.floating]
+    """The action of the first probe."""
+    story: _Story
+    ended: str
+    """How the episode has ended already; empty if it hasn't."""
+
+
+def open_episode(env: ProbeEnv, job: Job) -> Opening:
+    """Begin an episode, as every strategy finds it.
 
     Object, pose, first probe and the noise of each probe are the seed's, whatever the strategy: the
     first probe is that of `RandomProbe`, from the stream that the strategy goes on with. It is a
@@ -116,22 +130,39 @@ def play(env: ProbeEnv, policy: Policy, job: Job) -> EpisodeRow:
 
     Args:
         env: of the job's setting.
-        policy: what chooses the probes after the first; if it has a ``reset``, that is called.
         job: which episode.
     """
     rng = np.random.default_rng(np.random.SeedSequence(job.seed).spawn(1)[0])
     observation, _ = env.reset(seed=job.seed)
-    getattr(policy, "reset", lambda: None)()
     first = RandomProbe(task_of(env, job.setting.goal)).act(observation, rng)
+    observation, _, _, truncated, _ = env.step(first)
     story = _Story([], [], [], [], [])
-    ended, action = "", first
+    story.add(env)
+    ended = _outcome(env.belief, job.setting.goal) or (GAVE_UP if truncated else "")
+    return Opening(env, observation, rng, first, story, ended)
+
+
+def play(opening: Opening, policy: Policy, job: Job) -> EpisodeRow:
+    """Play an episode until the goal is reached, nothing fits, or no probe is left.
+
+    Args:
+        opening: of the job's episode; it is used up.
+        policy: what chooses the probes after the first; if it has a ``reset``, that is called.
+        job: which episode.
+    """
+    env, observation, story, ended = (
+        opening.env,
+        opening.observation,
+        opening.story,
+        opening.ended,
+    )
+    getattr(policy, "reset", lambda: None)()
     while not ended:
+        action = _timed_choice(policy, observation, opening.rng, story)
         observation, _, _, truncated, _ = env.step(action)
         story.add(env)
         ended = _outcome(env.belief, job.setting.goal) or (GAVE_UP if truncated else "")
-        if not ended:
-            action = _timed_choice(policy, observation, rng, story)
-    return _row(env, job, ended, first, story)
+    return _row(env, job, ended, opening.first, story)
 
 
 def _timed_choice(

@@ -22,7 +22,7 @@ from palpate.scripts.benchmark import MEMO_NOISE, benchmark, run_benchmark
 from palpate.scripts.benchmark_config import BenchmarkConfig, parse_noise
 from palpate.scripts.benchmark_row import GAVE_UP, SOLVED, EpisodeRow
 from palpate.scripts.benchmark_store import RowStore, only_writer
-from palpate.scripts.playing import make_env, play, task_of
+from palpate.scripts.playing import make_env, open_episode, play, task_of
 
 ROOT = Path(__file__).resolve().parent.parent
 QUICK = ("--objects", "simple-hand", "--noise", "5deg,0.01in")
@@ -123,7 +123,7 @@ def test_object_pose_first_probe_and_noise_are_the_same_whatever_the_strategy_dr
     job = next(small(max_probes=5).jobs())
     rows, felt = [], []
     for wasted in (0, 17):
-        rows.append(play(env, Wandering(wasted), job).untimed())
+        rows.append(play(open_episode(env, job), Wandering(wasted), job).untimed())
         felt.append(env.contacts.positions.copy())
     assert rows[0] == rows[1]
     assert len(rows[0].hypotheses) == rows[0].probes
@@ -136,7 +136,7 @@ def test_a_random_episode_is_the_one_that_the_episode_command_plays():
     (setting,) = small(max_probes=4).settings
     env = make_env(setting)
     job = next(small(max_probes=4, seed=3).jobs())
-    row = play(env, make_policy("random", task_of(env)), job)
+    row = play(open_episode(env, job), make_policy("random", task_of(env)), job)
     rng = np.random.default_rng(np.random.SeedSequence(3).spawn(1)[0])
     env.reset(seed=3)
     assert row.first_probe == tuple(rng.uniform(-1.0, 1.0, 3).astype(np.float32).tolist())
@@ -157,14 +157,15 @@ def test_an_answer_is_right_if_it_is_the_truth_and_wrong_if_it_is_another_object
     (setting,) = config.settings
     env = make_env(setting)
     policy, job = make_policy("random", task_of(env)), next(config.jobs())
-    row = play(env, policy, job)
+    row = play(open_episode(env, job), policy, job)
     assert (row.ended, row.right) == (SOLVED, True)
     assert row.rotation_error < np.radians(3.0)
     far = SimpleNamespace(rotation=0.06, translation=0.0)
     monkeypatch.setattr(playing, "pose_difference", lambda *_: far)
-    assert play(env, policy, job).right is False
+    assert play(open_episode(env, job), policy, job).right is False
     knows = replace(setting, goal="object")
-    assert play(env, policy, replace(job, setting=knows)).right is True
+    knowing = replace(job, setting=knows)
+    assert play(open_episode(env, knowing), policy, knowing).right is True
     monkeypatch.setattr(type(env), "true_object", SimpleNamespace(name="spoon"))
     assert playing._compared(env) == (False, None)
 
@@ -176,7 +177,7 @@ def test_the_goal_object_is_reached_at_the_first_contact_where_there_is_one_obje
     (setting,) = config.settings
     env = make_env(setting)
     for job in list(config.jobs())[:6:2]:
-        row = play(env, make_policy("random", task_of(env, "object")), job)
+        row = play(open_episode(env, job), make_policy("random", task_of(env, "object")), job)
         assert row.ended == SOLVED
         assert row.right
         assert row.contacts_felt[-1] > 0
@@ -473,3 +474,25 @@ def test_a_configuration_without_sense_is_refused():
         small(episodes=0)
     with pytest.raises(ValueError, match="policies is empty"):
         BenchmarkConfig(policies=(), objects=("housing",), noise=("pi/8,1mm",))
+
+
+@pytest.mark.parametrize(("sensor", "placement"), [("ray", "across"), ("finger", "resting")])
+def test_an_episode_that_begins_with_a_copy_goes_on_as_the_episode_itself(sensor, placement):
+    from palpate.policies import make_policy
+    from palpate.scripts.benchmark_workers import player
+
+    config = small(
+        objects=("simple-hand",),
+        noise=("pi/10,0.05in",),
+        policies=("random", "information"),
+        sensor=sensor,
+        placement=placement,
+        episodes=2,
+        max_probes=5,
+    )
+    (setting,) = config.settings
+    env = make_env(setting)
+    shared = player("")
+    for job in config.jobs():
+        policy = make_policy(job.policy, task_of(env))
+        assert shared(job).untimed() == play(open_episode(env, job), policy, job).untimed()
