@@ -90,7 +90,11 @@ class Belief:
 
     @property
     def unique(self) -> bool:
-        """Whether one hypothesis is left, with its pose fixed, and nothing was cut short."""
+        """Whether one hypothesis is left, with its pose fixed, and nothing was cut short.
+
+        Of a solid, then, no pose within the bounds that leads to the hypothesis's own without
+        breaking one is farther from it than the pose tolerance (see `extent`).
+        """
         return len(self.hypotheses) == 1 and self.hypotheses[0].determined and self.complete
 
     @property

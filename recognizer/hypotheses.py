@@ -57,7 +57,8 @@ class Hypothesis:
     freedoms: Floats
     """(d, 6) motions that the contacts leave open beyond the pose tolerance, d = 0 if none:
     orthonormal rows of rotation about the centroid (times half the diameter) and shift, in the
-    object's frame. Along them ``pose`` is one example of many."""
+    object's frame. Along them ``pose`` is one example of many. Beside other hypotheses this is
+    what least squares say; of one that is left alone all poses are looked at, see `extent`."""
     covariance: Floats
     """(6, 6) of the pose, in the same motions, square metres: a local approximation by the least
     squares of its best interpretation, with half a turn and half a diameter known beforehand."""
@@ -72,8 +73,8 @@ class Hypothesis:
     def pose(self) -> RigidTransform:
         """Model to world; the best fit among its interpretations.
 
-        It is within every bound if `proven`. Of poses that differ by a symmetry of the object only
-        one is reported.
+        Of a hypothesis left alone it may be the middle of its poses instead. It is within every
+        bound if `proven`. Of poses that differ by a symmetry of the object only one is reported.
         """
         return RigidTransform.from_matrix(self.T_world_object)
 

@@ -13,6 +13,7 @@ from scipy.spatial.transform import RigidTransform
 
 from .belief import Belief, Search
 from .contacts import EDGE, Contacts
+from .extent import pin_down
 from .features import Features
 from .free_space import FreeSpace
 from .hypotheses import Hypothesis, PoseTolerance
@@ -281,6 +282,8 @@ class Recognizer:
             )
             for index in np.lexsort((-weights, nulls))
         ]
+        if len(ranked) == 1 and ranked[0].determined and self._solids:
+            ranked = [self._pinned(ranked[0], contacts, known)]
         return Belief(
             tuple(ranked),
             tuple(searches),
@@ -289,6 +292,21 @@ class Recognizer:
             outliers,
             known.free_space,
             known.support,
+        )
+
+    def _pinned(self, only: Hypothesis, contacts: Contacts, known: Surroundings) -> Hypothesis:
+        """The only hypothesis left, determined only if all its poses are alike."""
+        entry = next(one for one in self._solids if one.model.name == only.object_name)
+        resting = known.support is not None and known.support.resting
+        return pin_down(
+            entry.test,
+            entry.model,
+            only,
+            contacts,
+            self.tolerance,
+            movable=known.says_nothing(contacts),
+            support=known.support,
+            stable=entry.stable_faces if resting else None,
         )
 
 
