@@ -29,6 +29,8 @@ LEADING = 4
 
 EVEN = 0.25
 """Share of the weights that all hypotheses have alike."""
+SETTLED = 5.0
+"""Standard deviations in the pose tolerance at which episodes mostly end."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -182,13 +184,14 @@ def settling_probe(
 def precision(observation: Observation, outcomes: Outcomes) -> Floats:
     """(a,) expected nats about the pose within a hypothesis, down to the task's tolerance.
 
-    The recogniser holds a motion for open if three standard deviations are beyond the tolerance.
+    The recogniser holds a motion for open if some pose within the bounds is beyond the tolerance:
+    as long as that is about `SETTLED` standard deviations or less.
     """
 
     def told(placed: PlacedModel, before: Floats, added: Floats) -> Floats:
         task = outcomes.task
         shift = task.tolerance.distance(placed.model.diameter, task.position_error)
-        fine = min(shift, task.tolerance.rotation * placed.radius) / 3.0
+        fine = min(shift, task.tolerance.rotation * placed.radius) / SETTLED
         return gain_to_tolerance(before, added, fine)
 
     return expected_gain(observation, outcomes, told)
