@@ -15,6 +15,10 @@ from .report_results import BASELINES, PolicyResult, SettingResult
 from .report_statistics import DRAWS, PERMUTATIONS, Estimate, distinguishable_outcomes
 
 TITLE = "Where to touch next: strategies compared"
+HITS = "random-hit"
+UNINFORMED = (*BASELINES, "grid")
+"""Strategies that don't ask what a probe would tell."""
+SIGNIFICANT = 0.05
 GOALS = {
     "both": "which object it is and how it lies",
     "pose": "how it lies",
@@ -76,6 +80,33 @@ def at_a_glance(results: Sequence[SettingResult]) -> list[Block]:
             " flatter it a little."
         ),
         Table(heads, rows),
+        *_worse_than_hits(results),
+    ]
+
+
+def _worse_than_hits(results: Sequence[SettingResult]) -> list[Block]:
+    """Which informed strategies a random probe that touches is better than; none without it."""
+    if not any(_named(result, HITS) for result in results):
+        return []
+    worse = [
+        f"{one.policy} on {result.objects}, {result.noise}: {_signed(one.against[HITS].difference)}"
+        f" probes, p {_p_value(one.against[HITS].p_value)}"
+        for result in results
+        for one in result.policies
+        if one.policy not in UNINFORMED
+        and one.against[HITS].difference.value > 0.0
+        and one.against[HITS].p_value < SIGNIFICANT
+    ]
+    rule = f"paired permutation test, p below {SIGNIFICANT} after Holm's correction"
+    if not worse:
+        return [
+            Paragraph(
+                f"No informed strategy needs more probes than {HITS} in any setting ({rule})."
+            )
+        ]
+    return [
+        Paragraph(f"Informed strategies that need more probes than {HITS} ({rule}):"),
+        Items(worse),
     ]
 
 

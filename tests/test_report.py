@@ -198,6 +198,20 @@ def test_a_page_has_the_figures_of_its_rows(tmp_path):
     assert "12 episodes a strategy; 100 % of them were solved by some strategy. Floor: 2.00" in page
 
 
+def test_a_page_names_informed_strategies_that_are_worse_than_random_hits(tmp_path):
+    write_report(played(tmp_path), tmp_path / "page")
+    page = (tmp_path / "page.md").read_text()
+    # random is worse too, but asks for nothing.
+    assert re.findall(r"^- (\S+) on .*: \+13.00 .* probes, p 0.001$", page, re.MULTILINE) == [
+        "lost"
+    ]
+    config = small(policies=POLICIES[:3], episodes=12)
+    run_benchmark(config, tmp_path / "b", lambda job: made_up_row(job, probes=NEEDED[job.policy]))
+    write_report(tmp_path / "b", tmp_path / "better")
+    page = (tmp_path / "better.md").read_text()
+    assert "No informed strategy needs more probes than random-hit in any setting" in page
+
+
 def test_the_html_page_needs_nothing_else(tmp_path):
     write_report(played(tmp_path), tmp_path / "page")
     page = (tmp_path / "page.html").read_text()
