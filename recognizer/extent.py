@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from . import extent_kernels, motion_kernels
+from . import extent_kernels, motion_kernels, polytope_kernels
 from .contacts import Contacts
 from .hypotheses import Hypothesis, PoseTolerance
 from .polyhedron import Polyhedron
@@ -109,7 +109,7 @@ def _looked_around(
     extra, extra_limits = _support_rows(test, hypothesis, turn, support, stable)
     size = len(contacts) * (extent_kernels.ROWS_OF_ONE + corners) + len(extra)
     rows, limits = np.empty((size, 6)), np.empty(size)
-    space = extent_kernels.simplex_space()
+    space = polytope_kernels.simplex_space()
     most = 4.0 * float(allowed.max())
     boxes, alike = [], True
     for faces in hypothesis.interpretations:
@@ -128,13 +128,13 @@ def _looked_around(
         )
         rows[count : count + len(extra)], limits[count : count + len(extra)] = extra, extra_limits
         known = (rows, limits, count + len(extra), most, space)
-        box = extent_kernels.box_of(axes, *known)
+        box = polytope_kernels.box_of(axes, *known)
         if not np.isfinite(box).all():
             continue  # none of its poses is near: those of a symmetry are
         boxes.append(box)
         for first, most_allowed in zip((0, 3), allowed, strict=True):
             part = slice(first, first + 3)
-            alike = alike and extent_kernels.all_within(
+            alike = alike and polytope_kernels.all_within(
                 first, axes[part, part].copy(), box[part], most_allowed, *known
             )
     if not boxes:

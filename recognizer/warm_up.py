@@ -41,6 +41,12 @@ def warm_up() -> None:
     prune(recognizer.tables("box"), contacts)
     prune(recognizer.tables("box"), contacts, constraints=Constraints(triple=True, area=True))
     square = Polygon.from_corners([(0.0, 0.0), (1.0, 0.0), (1.0, 2.0), (0.0, 2.0)], name="square")
+    # Contacts all around leave one pose, whose neighbours are looked at.
+    sides = np.repeat(np.concatenate([np.eye(3), -np.eye(3)]), 3, axis=0)
+    aside = 0.3 * np.sin(np.arange(54.0)).reshape(18, 3) * (sides == 0.0)
+    hits = cast_rays(box, RigidTransform.identity(), 5.0 * sides + aside, -sides)
+    around = Contacts(hits.points_world, hits.normals_world, position_error=0.04, normal_error=0.1)
+    recognizer.recognize(around)
     flat = Contacts([(0.5, 0.0)], [(0.0, -1.0)], position_error=0.01, normal_error=0.1)
     Recognizer([square]).recognize(flat)
 

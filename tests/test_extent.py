@@ -6,7 +6,7 @@ from scipy.optimize import linprog
 from scipy.spatial.transform import RigidTransform, Rotation
 from sensing import SMALL, feel, sense_grid, touch_faces
 
-from palpate.recognizer import Polyhedron, Recognizer, pose_difference
+from palpate.recognizer import Polyhedron, Recognizer, polytope_kernels, pose_difference
 from palpate.recognizer import extent_kernels as kernels
 from palpate.recognizer.pose import kernel_contacts
 
@@ -30,7 +30,7 @@ def _linprog(objective, rows, limits) -> float:
 
 
 def _known(rows, limits):
-    return rows, limits, len(rows), BOX, kernels.simplex_space()
+    return rows, limits, len(rows), BOX, polytope_kernels.simplex_space()
 
 
 def test_reaches_are_those_of_a_library_of_linear_programs():
@@ -38,13 +38,13 @@ def test_reaches_are_those_of_a_library_of_linear_programs():
     for _ in range(150):
         rows, limits = _polytope(rng)
         objective = rng.standard_normal(6) * (rng.random(6) < 0.7)
-        reach = kernels.farthest(objective, *_known(rows, limits))
+        reach = polytope_kernels.farthest(objective, *_known(rows, limits))
         assert reach == pytest.approx(_linprog(objective, rows, limits), abs=1e-8)
 
 
 def test_a_polytope_that_is_empty_reaches_nowhere():
     rows = np.array([[1.0, 0, 0, 0, 0, 0], [-1.0, 0, 0, 0, 0, 0]])
-    assert kernels.farthest(np.ones(6), *_known(rows, np.array([-0.01, 0.005]))) == -np.inf
+    assert polytope_kernels.farthest(np.ones(6), *_known(rows, np.array([-0.01, 0.005]))) == -np.inf
 
 
 @pytest.mark.parametrize("first", [0, 3], ids=["rotations", "shifts"])
@@ -57,13 +57,13 @@ def test_three_motions_are_within_what_is_allowed_if_no_direction_reaches_beyond
         rows, limits = _polytope(rng)
         axes = np.zeros((3, 6))
         axes[:, first : first + 3] = Rotation.random(rng=rng).as_matrix()
-        box = kernels.box_of(axes, *_known(rows, limits))
+        box = polytope_kernels.box_of(axes, *_known(rows, limits))
         objectives = np.zeros((len(directions), 6))
         objectives[:, first : first + 3] = directions
         reach = max(_linprog(one, rows, limits) for one in objectives)
         block = axes[:, first : first + 3].copy()
         for allowed in (0.9 * reach, 1.3 * reach):
-            within = kernels.all_within(first, block, box, allowed, *_known(rows, limits))
+            within = polytope_kernels.all_within(first, block, box, allowed, *_known(rows, limits))
             # Sixty directions see nearly how far it reaches, and never farther.
             assert within == (allowed > reach)
             answers.append(within)
