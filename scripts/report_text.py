@@ -9,6 +9,7 @@ from textwrap import dedent
 
 import numpy as np
 
+from ..recognizer import PoseTolerance
 from .benchmark_row import EpisodeRow
 from .report_page import Block, Code, Figure, Heading, Items, Paragraph, Table
 from .report_results import BASELINES, PolicyResult, SettingResult
@@ -227,7 +228,8 @@ def method(rows: Sequence[EpisodeRow]) -> list[Block]:
                 " the plane, no probe can.",
                 "Solved, right answers: shares with Wilson's 95 % score interval. An answer is"
                 " right if it names the true object and, where the pose is asked for, its pose is"
-                " within the pose tolerance of the true one, up to the object's symmetries. An"
+                f" within the pose tolerance ({_tolerance()}) of the true one, up to the object's"
+                " symmetries; the recogniser gives one only if all poses that the bounds allow are. An"
                 " episode in which nothing fits any more has ended with a wrong one.",
                 f"Intervals of means: percentile bootstrap, {DRAWS} resamples, drawn within strata"
                 " (setting and true object); of ratios and differences, episodes are resampled in"
@@ -268,6 +270,14 @@ def reproduction(settings: dict[str, object], rows: Sequence[EpisodeRow]) -> lis
         ),
         Items([f"played with {text}" for text in played]),
     ]
+
+
+def _tolerance() -> str:
+    tolerance = PoseTolerance()
+    return (
+        f"{np.degrees(tolerance.rotation):g}°, and for the centroid {100 * tolerance.translation:g} %"
+        f" of the diameter or {tolerance.position_errors:g} bounds on positions, whichever is more"
+    )
 
 
 def figures(drawn: Sequence[tuple[str, str, str]]) -> list[Block]:
