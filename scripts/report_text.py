@@ -229,7 +229,7 @@ def method(rows: Sequence[EpisodeRow]) -> list[Block]:
                 "Solved, right answers: shares with Wilson's 95 % score interval. An answer is"
                 " right if it names the true object and, where the pose is asked for, its pose is"
                 f" within the pose tolerance ({_tolerance()}) of the true one, up to the object's"
-                " symmetries; the recogniser gives one only if all poses that the bounds allow are. An"
+                " symmetries; the recogniser gives one only if all poses within the bounds are. An"
                 " episode in which nothing fits any more has ended with a wrong one.",
                 f"Intervals of means: percentile bootstrap, {DRAWS} resamples, drawn within strata"
                 " (setting and true object); of ratios and differences, episodes are resampled in"
@@ -275,7 +275,7 @@ def reproduction(settings: dict[str, object], rows: Sequence[EpisodeRow]) -> lis
 def _tolerance() -> str:
     tolerance = PoseTolerance()
     return (
-        f"{np.degrees(tolerance.rotation):g}°, and for the centroid {100 * tolerance.translation:g} %"
+        f"{np.degrees(tolerance.rotation):g}°, for the centroid {100 * tolerance.translation:g} %"
         f" of the diameter or {tolerance.position_errors:g} bounds on positions, whichever is more"
     )
 
