@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from ..recognizer.motion_kernels import perpendicular
+
 
 @njit(cache=True)
 def blur_rows(touched, points, normals, directions, draws, even, radius, half_angle, moved, turned):
@@ -44,15 +46,7 @@ def blur_rows(touched, points, normals, directions, draws, even, radius, half_an
 @njit(cache=True)
 def _lean(normal, cosine, around, turned):
     x, y, z = normal
-    # Two unit vectors across, from the axis that leans the least on this one.
-    if abs(x) <= abs(y) and abs(x) <= abs(z):
-        u0, u1, u2 = 0.0, z, -y
-    elif abs(y) <= abs(z):
-        u0, u1, u2 = -z, 0.0, x
-    else:
-        u0, u1, u2 = y, -x, 0.0
-    size = np.sqrt(u0 * u0 + u1 * u1 + u2 * u2)
-    u0, u1, u2 = u0 / size, u1 / size, u2 / size
+    u0, u1, u2 = perpendicular(x, y, z)
     v0, v1, v2 = y * u2 - z * u1, z * u0 - x * u2, x * u1 - y * u0
     sine = np.sqrt(max(1.0 - cosine * cosine, 0.0))
     one, other = sine * np.cos(around), sine * np.sin(around)

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from . import extent_kernels, motion_kernels, polytope_kernels
 from .contacts import Contacts
 from .hypotheses import Hypothesis, PoseTolerance
-from .polyhedron import Polyhedron
 from .pose import ModelTest, kernel_contacts
 from .support import StableFace, SupportPlane
 
@@ -30,7 +29,6 @@ WITNESS = 1.0 + 1e-9
 
 def pin_down(
     test: ModelTest,
-    model: Polyhedron,
     hypothesis: Hypothesis,
     contacts: Contacts,
     tolerance: PoseTolerance,
@@ -46,8 +44,7 @@ def pin_down(
     pose tolerance (see `extent_kernels.contact_rows`): so no such pose is overlooked.
 
     Args:
-        test: of the model.
-        model: the object.
+        test: of the object.
         hypothesis: one that its least squares say to be determined.
         contacts: what was felt.
         tolerance: which poses count as the same.
@@ -59,9 +56,8 @@ def pin_down(
         The hypothesis, its pose moved if that is still a witness, and with freedoms if some pose
         may be beyond the tolerance of it.
     """
-    radius = model.diameter / 2.0
-    most_shift = tolerance.distance(model.diameter, float(contacts.position_error.max()))
-    allowed = np.array([tolerance.rotation * radius, most_shift])
+    most_shift = tolerance.distance(2.0 * test.radius, float(contacts.position_error.max()))
+    allowed = np.array([tolerance.rotation * test.radius, most_shift])
     axes = _axes(hypothesis.covariance)
     box = np.zeros((6, 2))
     for _ in range(ROUNDS):

@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 
 from .compiling import borrowing
-from .motion_kernels import cross
+from .motion_kernels import cross, perpendicular
 from .proof_kernels import workspace
 from .reading_kernels import UNKNOWN_NORMAL, carry, read, worst_on_pieces
 
@@ -102,16 +102,7 @@ def contact_rows(faces, contacts, errors, model, half_angles, x, u, turn, rows, 
         if half_angles[f] > 0.0 or chords[i] >= UNKNOWN_NORMAL or errors[i] >= 0.5 * np.pi:
             continue
         # The measured normal turns to u + u x w; its part across the face's is a sine at most.
-        least = 0
-        for k in range(1, 3):
-            if abs(normals[f, k]) < abs(normals[f, least]):
-                least = k
-        for k in range(3):
-            side[k] = 1.0 * (k == least)
-        cross(normals[f], side, first)
-        length = np.sqrt(_along(first, first))
-        for k in range(3):
-            first[k] /= length
+        first[0], first[1], first[2] = perpendicular(normals[f, 0], normals[f, 1], normals[f, 2])
         cross(normals[f], first, second)
         for tangent in range(TANGENTS):
             angle = 2.0 * np.pi * tangent / TANGENTS

@@ -14,6 +14,7 @@ import numpy as np
 from numba import njit
 
 from .compiling import borrowing
+from .motion_kernels import perpendicular
 
 PARALLEL = 1e-14
 """Normals whose cosine is this near to one are taken as the same: they differ by 1.5e-7."""
@@ -51,16 +52,11 @@ def _some_direction(axes, limits, count):
     for k in range(count):
         if limits[k] < -1.0 - SLACK:
             return False
-        # Any point of the circle: about the coordinate axis least along its own.
+        # Any point of the circle.
         a, b, c = axes[k, 0], axes[k, 1], axes[k, 2]
-        if abs(a) <= abs(b) and abs(a) <= abs(c):
-            x, y, z = 0.0, c, -b
-        elif abs(b) <= abs(c):
-            x, y, z = -c, 0.0, a
-        else:
-            x, y, z = b, -a, 0.0
+        x, y, z = perpendicular(a, b, c)
         height = min(max(limits[k], -1.0), 1.0)
-        far = np.sqrt(max(1.0 - height * height, 0.0) / (x * x + y * y + z * z))
+        far = np.sqrt(max(1.0 - height * height, 0.0))
         if not _beyond(
             axes, limits, count, height * a + far * x, height * b + far * y, height * c + far * z
         ):

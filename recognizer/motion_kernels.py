@@ -23,6 +23,19 @@ def cross(a, b, out):
 
 
 @borrowing
+def perpendicular(x, y, z):
+    """A unit vector across another: also across the axis that leans the least on that one."""
+    if abs(x) <= abs(y) and abs(x) <= abs(z):
+        u0, u1, u2 = 0.0, z, -y
+    elif abs(y) <= abs(z):
+        u0, u1, u2 = -z, 0.0, x
+    else:
+        u0, u1, u2 = y, -x, 0.0
+    size = np.sqrt(u0 * u0 + u1 * u1 + u2 * u2)
+    return u0 / size, u1 / size, u2 / size
+
+
+@borrowing
 def to_object(points, normals, rotation, translation, x, u):
     """Contacts and normals, (n, 3) each, from the world into the object's frame: ``x``, ``u``."""
     for i in range(len(points)):

@@ -300,7 +300,6 @@ class Recognizer:
         resting = known.support is not None and known.support.resting
         return pin_down(
             entry.test,
-            entry.model,
             only,
             contacts,
             self.tolerance,
