@@ -11,7 +11,7 @@ import numpy as np
 from numba import njit
 
 from .compiling import borrowing
-from .motion_kernels import cross, perpendicular
+from .motion_kernels import cross, perpendicular, slope_row
 from .proof_kernels import workspace
 from .reading_kernels import UNKNOWN_NORMAL, carry, read, worst_on_pieces
 
@@ -19,19 +19,6 @@ TANGENTS = 8
 """Half-planes about a cone of normals."""
 ROWS_OF_ONE = 2 * 3 + TANGENTS
 """Inequalities of a contact, but for one for each corner of its feature's hull."""
-
-
-@borrowing
-def _hold(direction, room, arm, radius, rows, limits, count):
-    """Add that a contact moves by no more than ``room`` along a direction of the object's frame."""
-    # It moves by -w x arm - s; rotations are scaled by the radius.
-    rows[count, 0] = -(arm[1] * direction[2] - arm[2] * direction[1]) / radius
-    rows[count, 1] = -(arm[2] * direction[0] - arm[0] * direction[2]) / radius
-    rows[count, 2] = -(arm[0] * direction[1] - arm[1] * direction[0]) / radius
-    for k in range(3):
-        rows[count, 3 + k] = -direction[k]
-    limits[count] = room
-    return count + 1
 
 
 @borrowing
@@ -84,7 +71,9 @@ def contact_rows(faces, contacts, errors, model, half_angles, x, u, turn, rows, 
                 for c in range(start[f], start[f + 1]):
                     most = max(most, _along(direction, corners[c]))
                 room = most + margin - _along(direction, x[i])
-                count = _hold(direction, room, arm, radius, rows, limits, count)
+                slope_row(direction, arm, radius, first, rows[count])
+                limits[count] = room
+                count += 1
         if flat:
             for c in range(start[f], start[f + 1]):
                 after = c + 1 if c + 1 < start[f + 1] else start[f]
@@ -98,7 +87,9 @@ def contact_rows(faces, contacts, errors, model, half_angles, x, u, turn, rows, 
                 for other in range(start[f], start[f + 1]):
                     most = max(most, _along(direction, corners[other]))
                 room = most + margin - _along(direction, x[i])
-                count = _hold(direction, room, arm, radius, rows, limits, count)
+                slope_row(direction, arm, radius, first, rows[count])
+                limits[count] = room
+                count += 1
         if half_angles[f] > 0.0 or chords[i] >= UNKNOWN_NORMAL or errors[i] >= 0.5 * np.pi:
             continue
         # The measured normal turns to u + u x w; its part across the face's is a sine at most.
