@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from gymnasium import spaces
+from scipy.spatial.transform import Rotation
 
 from ..recognizer import Belief, Contacts
 from ..recognizer.predict import PoseSamples
@@ -113,14 +114,16 @@ class ObservationLayout:
         hypotheses = belief.hypotheses if belief else ()
         values["hypothesis_count"][0] = len(hypotheses)
         values["interpretation_count"][0] = belief.interpretations if belief else 0
-        for row, hypothesis in enumerate(hypotheses[: self.hypotheses]):
-            quaternion = hypothesis.pose.rotation.as_quat(canonical=True)
-            values["hypothesis_objects"][row] = object_index[hypothesis.object_name]
-            position = np.clip(hypothesis.pose.translation, -self.extent, self.extent)
-            values["hypothesis_positions"][row] = position
-            values["hypothesis_quaternions"][row] = np.clip(quaternion, -1.0, 1.0)
-            values["hypothesis_weights"][row] = hypothesis.weight
-            values["hypothesis_determined"][row] = hypothesis.determined
+        leading = hypotheses[: self.hypotheses]
+        if leading:
+            rows = slice(len(leading))
+            poses = np.array([hypothesis.T_world_object for hypothesis in leading])
+            quaternions = Rotation.from_matrix(poses[:, :3, :3]).as_quat(canonical=True)
+            values["hypothesis_objects"][rows] = [object_index[h.object_name] for h in leading]
+            values["hypothesis_positions"][rows] = poses[:, :3, 3].clip(-self.extent, self.extent)
+            values["hypothesis_quaternions"][rows] = quaternions.clip(-1.0, 1.0)
+            values["hypothesis_weights"][rows] = [hypothesis.weight for hypothesis in leading]
+            values["hypothesis_determined"][rows] = [h.determined for h in leading]
         shown = len(samples)
         values["sample_count"][0] = shown
         values["sample_objects"][:shown] = samples.objects

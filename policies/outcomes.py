@@ -166,7 +166,7 @@ class Outcomes:
             ),
             (samples.position_spread, samples.rotation_spread),
             _joined([model.pieces for model in models], models),
-            (np.empty(3), np.empty(3)),
+            (np.empty(3), np.empty(ends[-1], np.int64), *np.empty((2, ends[-1]))),
             out,
         )
 
@@ -203,12 +203,16 @@ def _joined(
     corners = np.cumsum([0, *(len(piece.corners) for piece in pieces)])
     first = [piece.first[:-1] + many for piece, many in zip(pieces, polygons, strict=False)]
     start = [piece.start[:-1] + many for piece, many in zip(pieces, corners, strict=False)]
+    normals = np.concatenate([model.normals for model in models])
+    offsets = np.concatenate([model.offsets for model in models])
+    balls = np.concatenate([piece.balls for piece in pieces])
     return (
-        np.concatenate([model.normals for model in models]),
-        np.concatenate([model.offsets for model in models]),
+        normals,
+        offsets,
         np.append(np.concatenate(first), polygons[-1]),
         np.append(np.concatenate(start), corners[-1]),
         np.concatenate([piece.corners for piece in pieces]),
+        np.ascontiguousarray(np.column_stack([normals, offsets, balls]).T),
     )
 
 

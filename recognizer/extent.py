@@ -15,6 +15,7 @@ from . import extent_kernels, motion_kernels, polytope_kernels
 from .contacts import Contacts
 from .hypotheses import Hypothesis, PoseTolerance
 from .pose import ModelTest, kernel_contacts
+from .simplex_kernels import simplex_space
 from .support import StableFace, SupportPlane
 
 Floats = NDArray[np.float64]
@@ -105,8 +106,8 @@ def _looked_around(
     extra, extra_limits = _support_rows(test, hypothesis, turn, support, stable)
     size = len(contacts) * (extent_kernels.ROWS_OF_ONE + corners) + len(extra)
     rows, limits = np.empty((size, 6)), np.empty(size)
-    space = polytope_kernels.simplex_space()
-    most = 4.0 * float(allowed.max())
+    space = simplex_space()
+    widest = np.full(6, 4.0 * float(allowed.max()))
     boxes, alike = [], True
     for faces in hypothesis.interpretations:
         count = extent_kernels.contact_rows(
@@ -123,7 +124,7 @@ def _looked_around(
             tuple(np.empty((5, 3))),
         )
         rows[count : count + len(extra)], limits[count : count + len(extra)] = extra, extra_limits
-        known = (rows, limits, count + len(extra), most, space)
+        known = (rows, limits, count + len(extra), -widest, widest, space)
         box = polytope_kernels.box_of(axes, *known)
         if not np.isfinite(box).all():
             continue  # none of its poses is near: those of a symmetry are

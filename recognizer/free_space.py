@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -94,6 +95,7 @@ class FreeSpace:
         return self.radius - self.error
 
     @classmethod
+    @cache
     def none(cls) -> FreeSpace:
         """No paths at all."""
         return cls(np.zeros((0, 3)), np.zeros((0, 3)), error=np.zeros(0))

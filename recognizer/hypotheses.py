@@ -78,6 +78,14 @@ class Hypothesis:
         """
         return RigidTransform.from_matrix(self.T_world_object)
 
+    def ranked(self, weight: float, order: NDArray[np.intp]) -> Hypothesis:
+        """The same with a weight, and with the contacts of its interpretations in an order."""
+        hypothesis = object.__new__(Hypothesis)  # hundreds at a time: `replace` takes longer
+        hypothesis.__dict__.update(self.__dict__)
+        hypothesis.__dict__["weight"] = weight
+        hypothesis.__dict__["interpretations"] = self.interpretations[:, order]
+        return hypothesis
+
     @property
     def determined(self) -> bool:
         """Whether the contacts fix all six freedoms."""
@@ -112,7 +120,9 @@ def cluster(
     most_shift = tolerance.distance(model.diameter, position_error)
     centres = poses.translations + poses.rotations @ model.centroid
     groups = group_poses(poses.rotations, centres, model.symmetries, tolerance.rotation, most_shift)
-    leaders = np.unique(groups, return_index=True)[1]
+    # Groups are numbered by their first members, which are their best.
+    order = np.argsort(groups, kind="stable")
+    starts = np.searchsorted(groups[order], np.arange(groups.max() + 1))
     prior = np.diag([1.0 / (np.pi * radius)] * 3 + [1.0 / radius] * 3) ** 2
     covariances = np.linalg.inv(poses.informations + prior)
     variances, motions = np.linalg.eigh(covariances)
@@ -121,47 +131,41 @@ def cluster(
     # Three standard deviations of each motion, against what the tolerance allows it: with bounded
     # noise hardly any fit is off by more.
     allowed = min(tolerance.rotation * radius, most_shift)
-    hypotheses, log_weights = [], np.empty(len(leaders))
     loose = 3.0 * np.sqrt(variances) > allowed
-    for group, leader in enumerate(leaders):
-        members = np.flatnonzero(groups == group)
-        hypotheses.append(
-            Hypothesis(
-                object_name=model.name,
-                T_world_object=_matrix(poses.rotations[leader], poses.translations[leader]),
-                weight=1.0,
-                interpretations=poses.faces[members],
-                freedoms=_open_motions(leader, members, loose, motions, poses.rotations),
-                covariance=covariances[leader].astype(float),
-                proven=bool(poses.proven[leader]),
-            )
+    matrices = np.zeros((len(starts), 4, 4))
+    leaders = order[starts]
+    matrices[:, :3, :3], matrices[:, :3, 3] = poses.rotations[leaders], poses.translations[leaders]
+    matrices[:, 3, 3] = 1.0
+    hypotheses = [
+        Hypothesis(
+            object_name=model.name,
+            T_world_object=matrix,
+            weight=1.0,
+            interpretations=poses.faces[members],
+            freedoms=_open_motions(members, loose, motions, poses.rotations),
+            covariance=covariances[members[0]].copy(),
+            proven=bool(poses.proven[members[0]]),
         )
-        log_weights[group] = np.logaddexp.reduce(log_shares[members])
-    return hypotheses, log_weights
+        for matrix, members in zip(matrices, np.split(order, starts[1:]), strict=True)
+    ]
+    return hypotheses, np.logaddexp.reduceat(log_shares[order], starts)
 
 
 def _open_motions(
-    leader: np.intp,
-    members: NDArray[np.intp],
-    loose: NDArray[np.bool_],
-    motions: Floats,
-    rotations: Floats,
+    members: NDArray[np.intp], loose: NDArray[np.bool_], motions: Floats, rotations: Floats
 ) -> Floats:
-    """(d, 6) what the leader of a group leaves open, or else what one of its other members does.
+    """(d, 6) what the first of a group leaves open, or else what one of its other members does.
 
     Any of them may be the true one, so that a pose is fixed only if each fixes it.
     """
-    for member in (leader, *members):
-        if loose[member].any():
-            # In the leader's frame: members may be turned by a symmetry of the object.
-            turn = rotations[leader].T @ rotations[member]
-            rows = motions[member].T[loose[member]].reshape(-1, 2, 3)
-            return rows.reshape(-1, 6) if member == leader else (rows @ turn.T).reshape(-1, 6)
+    first = members[0]
+    for member in members:
+        open_ways = loose[member]
+        if open_ways.any():
+            rows = motions[member].T[open_ways]
+            if member == first:
+                return rows
+            # In the first one's frame: members may be turned by a symmetry of the object.
+            turn = rotations[member].T @ rotations[first]
+            return (rows.reshape(-1, 2, 3) @ turn).reshape(-1, 6)
     return np.zeros((0, 6))
-
-
-def _matrix(rotation: Floats, translation: Floats) -> Floats:
-    matrix = np.eye(4)
-    matrix[:3, :3] = rotation
-    matrix[:3, 3] = translation
-    return matrix

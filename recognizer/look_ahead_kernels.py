@@ -11,10 +11,11 @@ import numpy as np
 
 from .compiling import borrowing
 from .mask_kernels import bit_index
-from .motion_kernels import copy_pose, copy_rotation
+from .motion_kernels import copy_pose, copy_rotation, move
 from .possible_kernels import possible
 from .reading_kernels import carry
 from .region_kernels import square_root
+from .shrink_kernels import box_region, shrink_box
 from .verdict_kernels import REJECTED, judge
 
 _ONE = np.uint64(1)
@@ -74,6 +75,49 @@ def drop_beyond_region(
                     sizes[j] += 1
                 else:
                     domains[j, w] ^= lowest
+
+
+@borrowing
+def shrink_ball(depth, faces, model, contacts, angle, rotation, translation, work, stack, space):
+    """Shrink the ball of rotations about a branch's pose, which goes to the ball's middle.
+
+    Args:
+        depth: how many contacts are assigned.
+        faces: (n,) their features, -1 for none.
+        model: see `search_kernels.search_model`.
+        contacts: likewise.
+        angle: bounds every rotation within the bounds from the pose, radians.
+        rotation: (3, 3) object to world, of the pose that the region in the work space is about,
+            and that has been read; moved in place.
+        translation: (3,) likewise.
+        work: see `proof_kernels.workspace`.
+        stack: see `search_pose_kernels.box_stack`.
+        space: axes (3, 3), centre (3,) and half sides (3,) of a box, a step (6,), a pose (3, 3)
+            and (3,).
+
+    Returns:
+        The angle of the ball about the pose now, radians; -1 if no pose is left.
+    """
+    axes, centre, half, step, turned, shifted = space
+    x, u, levers, _ = work[3]
+    region, pivot = work[1], work[5][2]
+    box_region(region, axes, centre, half, turned)
+    if not shrink_box(
+        *(depth, faces, faces, x, levers, u, model, contacts, region, axes, centre, half, stack[9])
+    ):
+        return -1.0
+    square = 0.0
+    for a in range(3):
+        square += half[a] ** 2
+        step[a], step[3 + a] = 0.0, 0.0
+        for k in range(3):
+            step[a] += axes[a, k] * centre[k]
+    # Two turns exp(v) and exp(w) are at most |v - w| apart.
+    if np.sqrt(square) >= angle:
+        return angle
+    move(rotation, translation, step, pivot, 1.0, turned, shifted)
+    copy_pose(turned, shifted, rotation, translation)
+    return np.sqrt(square)
 
 
 @borrowing

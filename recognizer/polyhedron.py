@@ -55,6 +55,16 @@ class FacePolygons:
             corners=np.ascontiguousarray(np.concatenate(flat)),
         )
 
+    @cached_property
+    def balls(self) -> NDArray[np.float64]:
+        """(f, 4) centre and radius, metres, of a ball around each face."""
+        firsts = self.start[self.first[:-1]]
+        lows = np.minimum.reduceat(self.corners, firsts)
+        centres = 0.5 * (lows + np.maximum.reduceat(self.corners, firsts))
+        sizes = np.diff(np.append(firsts, len(self.corners)))
+        away = np.linalg.norm(self.corners - np.repeat(centres, sizes, axis=0), axis=1)
+        return np.column_stack([centres, np.maximum.reduceat(away, firsts)])
+
 
 @dataclass(frozen=True, eq=False)
 class Polyhedron:

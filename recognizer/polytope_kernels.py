@@ -10,108 +10,24 @@ import numpy as np
 from numba import njit
 
 from .compiling import borrowing
+from .simplex_kernels import farthest
 
-PIVOTS = 60
-"""The most; the bound of a program that needs more is the one it has by then."""
 CUTS = 24
 """Planes that are cut off the shadow of a polytope; one that takes more counts as too long."""
 MOST_CORNERS = 256
-EXACT = 1e-9
-"""By how much a vertex may break an inequality, as a share of the box it is sought in."""
-
-
-@borrowing
-def farthest(objective, rows, limits, count, most, space):
-    """How far a polytope reaches along a direction, by the dual simplex method.
-
-    The bound is one by weak duality at every step, so that it holds whenever the method stops.
-
-    Args:
-        objective: (6,) the direction.
-        rows: (m, 6) of the inequalities, of which ``count`` count.
-        limits: (m,) likewise.
-        count: how many.
-        most: no step along an axis is longer, metres.
-        space: active rows (6,), the inverse of their matrix (6, 6), multipliers (6,), a vertex
-            (6,), a row's multipliers (6,).
-
-    Returns:
-        The reach, metres; minus infinity if the polytope is empty.
-    """
-    active, inverse, multipliers, vertex, shares = space
-    # The box's own rows are count + 2 k for -e_k and count + 2 k + 1 for e_k.
-    for k in range(6):
-        positive = objective[k] >= 0.0
-        active[k] = count + 2 * k + (1 if positive else 0)
-        for j in range(6):
-            inverse[k, j] = 0.0
-        inverse[k, k] = 1.0 if positive else -1.0
-        multipliers[k] = abs(objective[k])
-    bound = 0.0
-    for _ in range(PIVOTS):
-        bound = 0.0
-        for j in range(6):
-            limit = most if active[j] >= count else limits[active[j]]
-            bound += max(multipliers[j], 0.0) * limit
-            for k in range(6):
-                if j == 0:
-                    vertex[k] = 0.0
-                vertex[k] += inverse[k, j] * limit
-        entering, worst = -1, EXACT * most
-        for r in range(count):
-            excess = -limits[r]
-            for k in range(6):
-                excess += rows[r, k] * vertex[k]
-            if excess > worst:
-                entering, worst = r, excess
-        for k in range(6):
-            if abs(vertex[k]) - most > worst:
-                entering = count + 2 * k + (1 if vertex[k] > 0.0 else 0)
-                worst = abs(vertex[k]) - most
-        if entering < 0:
-            return bound
-        leaving, ratio = -1, np.inf
-        for j in range(6):
-            shares[j] = 0.0
-            for k in range(6):
-                if entering >= count:
-                    unit = 1.0 if (entering - count) & 1 else -1.0
-                    entry = unit if (entering - count) >> 1 == k else 0.0
-                else:
-                    entry = rows[entering, k]
-                shares[j] += entry * inverse[k, j]
-            if shares[j] > 1e-9 and multipliers[j] < ratio * shares[j]:
-                leaving, ratio = j, multipliers[j] / shares[j]
-        if leaving < 0:
-            return -np.inf
-        for j in range(6):
-            multipliers[j] = ratio if j == leaving else multipliers[j] - ratio * shares[j]
-        for k in range(6):
-            inverse[k, leaving] /= shares[leaving]
-        for j in range(6):
-            if j != leaving:
-                for k in range(6):
-                    inverse[k, j] -= shares[j] * inverse[k, leaving]
-        active[leaving] = entering
-    return bound
 
 
 @njit(cache=True)
-def simplex_space():
-    """Work space for `farthest`."""
-    return np.empty(6, np.int64), np.empty((6, 6)), np.empty(6), np.empty(6), np.empty(6)
-
-
-@njit(cache=True)
-def box_of(axes, rows, limits, count, most, space):
+def box_of(axes, rows, limits, count, low, high, space):
     """How far a polytope reaches along directions, there and back.
 
     Args:
         axes: (k, 6) unit directions.
-        rows: see `farthest`, as are the others.
+        rows: see `simplex_kernels.farthest`, as are the others.
         limits: likewise.
         count: likewise.
-        most: likewise.
+        low: likewise.
+        high: likewise.
         space: likewise.
 
     Returns:
@@ -124,7 +40,7 @@ def box_of(axes, rows, limits, count, most, space):
             sign = 2.0 * side - 1.0
             for k in range(6):
                 objective[k] = sign * axes[a, k]
-            found[a, side] = sign * farthest(objective, rows, limits, count, most, space)
+            found[a, side] = sign * farthest(objective, rows, limits, count, low, high, space)
     return found
 
 
@@ -181,7 +97,7 @@ def _cut(planes, heights, number, corners, height):
 
 
 @njit(cache=True)
-def all_within(first, axes, box, allowed, rows, limits, count, most, space):
+def all_within(first, axes, box, allowed, rows, limits, count, low, high, space):
     """Whether three of the six motions together are nowhere longer in a polytope than is allowed.
 
     The largest length of a convex set's points is sought from outside: its shadow on the three
@@ -194,10 +110,11 @@ def all_within(first, axes, box, allowed, rows, limits, count, most, space):
         axes: (3, 3) orthonormal directions among them.
         box: (3, 2) how far the polytope reaches along these.
         allowed: metres.
-        rows: see `farthest`, as are the others.
+        rows: see `simplex_kernels.farthest`, as are the others.
         limits: likewise.
         count: likewise.
-        most: likewise.
+        low: likewise.
+        high: likewise.
         space: likewise.
     """
     for a in range(3):
@@ -234,7 +151,7 @@ def all_within(first, axes, box, allowed, rows, limits, count, most, space):
         for k in range(3):
             planes[number, k] = corners[where, k] / longest
             objective[first + k] = planes[number, k]
-        heights[number] = farthest(objective, rows, limits, count, most, space)
+        heights[number] = farthest(objective, rows, limits, count, low, high, space)
         if heights[number] > allowed:
             return False
         number += 1

@@ -238,6 +238,46 @@ def worst_on_pieces(count, faces, targets, x, model, contacts, readings):
 
 
 @borrowing
+def meets_all(count, faces, x, u, model, contacts, slack, spare):
+    """Whether every reading is within its bound, concave faces as they are; stops at the first no.
+
+    Arguments as in `read`; ``slack`` is a share of each bound, (3,) ``spare`` is work space.
+    """
+    normals, offsets, first, start, corners, _, _, cone_start, cone_normals = model
+    _, _, reaches, chords, sines = contacts
+    wider = 1.0 + slack
+    # A feature is no nearer than its plane: most poses fail here, or by a normal.
+    for i in range(count):
+        f = faces[i]
+        if f < 0:
+            continue
+        height = normals[f, 0] * x[i, 0] + normals[f, 1] * x[i, 1] + normals[f, 2] * x[i, 2]
+        if abs(height - offsets[f]) > wider * reaches[i]:
+            return False
+        if chords[i] >= UNKNOWN_NORMAL:
+            continue
+        kind, miss = nearest_in_cone(u[i], cone_normals, cone_start[f], cone_start[f + 1], spare)
+        if kind == ARC and sines[i] < 1.0 and miss > wider * sines[i]:
+            return False
+        if kind not in (NO_CONE, ARC) and miss > wider * chords[i]:
+            return False
+    for i in range(count):
+        f = faces[i]
+        if f < 0:
+            continue
+        squared = np.inf
+        concave = first[f + 1] - first[f] > 1
+        for p in range(first[f] if concave else f, first[f + 1] if concave else f + 1):
+            gap, _, _ = nearest_on_feature(
+                x[i], normals[f], offsets[f], corners, start[p], start[p + 1], spare
+            )
+            squared = min(squared, gap)
+        if squared > (wider * reaches[i]) ** 2:
+            return False
+    return True
+
+
+@borrowing
 def carry(count, points, measured, rotation, translation, x, u):
     """The first contacts and normals, world frame, into the object's frame: ``x``, ``u``."""
     for i in range(count):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
@@ -273,13 +273,11 @@ class Recognizer:
             )
             _note(found, hypotheses, logs, searches)
         weights = _normalised(np.concatenate(logs) if logs else np.zeros(0))
-        nulls = np.array([(h.interpretations < 0).sum(axis=1).min() for h in hypotheses])
+        nulls = np.zeros(len(hypotheses), np.int64)
+        if outliers:
+            nulls[:] = [(h.interpretations < 0).sum(axis=1).min() for h in hypotheses]
         ranked = [
-            replace(
-                hypotheses[index],
-                weight=float(weights[index]),
-                interpretations=hypotheses[index].interpretations[:, back],
-            )
+            hypotheses[index].ranked(float(weights[index]), back)
             for index in np.lexsort((-weights, nulls))
         ]
         if len(ranked) == 1 and ranked[0].determined and self._solids:

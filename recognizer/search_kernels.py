@@ -18,7 +18,7 @@ from .compiling import borrowing
 from .forward_kernels import check_forward, take_lowest
 from .leaf_kernels import place_of, table_of
 from .lean_kernels import lean_space, leans
-from .look_ahead_kernels import drop_beyond_region, drop_rejected
+from .look_ahead_kernels import drop_beyond_region, drop_rejected, shrink_ball
 from .mask_kernels import pair_readings
 from .pose_kernels import finish, settle, start_pose
 from .prefix_kernels import begin, face_cell
@@ -150,6 +150,7 @@ def search_model(
     aligned, branch_turn, branch_shift = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
     held = (np.empty(n, np.int64), np.empty((3, 3)), np.empty((3, 3)), np.empty(3))
     ball = work[6][1]
+    tight = (np.empty((3, 3)), np.empty(3), np.empty(3), np.empty(6), np.empty((3, 3)), np.empty(3))
     nodes = np.zeros(n, np.int64)
     counts = np.zeros(COUNTS, np.int64)
     found = 0
@@ -341,6 +342,24 @@ def search_model(
                         and completions > FEW
                         and counts[LEAVES_TRIED] >= PATIENCE
                     ):
+                        # The tighter the ball, the more of these verdicts are rejections.
+                        angle = shrink_ball(
+                            depth,
+                            faces,
+                            model,
+                            contacts,
+                            angle,
+                            turns[depth],
+                            shifts[depth],
+                            work,
+                            stack,
+                            tight,
+                        )
+                        if angle < 0.0:
+                            counts[INNER_REJECTED] += 1
+                            note_boxes(depth, 0, spent)
+                            continue
+                        angles[depth] = angle
                         counts[VERDICTS] += drop_rejected(
                             depth,
                             faces,

@@ -11,12 +11,12 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from .align_kernels import diagonalise
 from .compiling import borrowing
 from .feasibility_kernels import seek_feasible
 from .motion_kernels import copy_pose, copy_rotation, move
-from .proof_kernels import locate
+from .proof_kernels import locate, set_levers
 from .reading_kernels import carry, read, worst_on_pieces
+from .shrink_kernels import box_region, shrink_box, shrink_space
 from .turn_kernels import note_turns, open_turns, turn_space
 from .verdict_kernels import BESIDE, EXACT, FEASIBLE, REJECTED, UNDECIDED, judge
 
@@ -54,26 +54,6 @@ def _volume(region):
 
 
 @borrowing
-def _box_region(region, axes, centre, half, form):
-    """The box around a region's rotations, about the pose that the region is about.
-
-    Whatever the axes, a box of these sides holds the region; (3, 3) ``form`` is work space.
-    """
-    for a in range(3):
-        for b in range(3):
-            form[a, b] = region[1][a, b]
-    diagonalise(form, axes)
-    for k in range(3):
-        square = 0.0
-        centre[k] = 0.0
-        for a in range(3):
-            centre[k] += axes[a, k] * region[2][a]
-            for b in range(3):
-                square += axes[a, k] * region[1][a, b] * axes[b, k]
-        half[k] = np.sqrt(max(square, 0.0)) * (1.0 + 1e-9)
-
-
-@borrowing
 def _copy_weights(count, weights, kept):
     for i in range(count):
         for k in range(2):
@@ -83,7 +63,7 @@ def _copy_weights(count, weights, kept):
 @borrowing
 def _copy_box(count, box, at, chosen, weights, stack):
     """Write a box of the stack to another place of it, with these polygons and weights."""
-    turns, shifts, axes, centres, halves, targets, kept, _, _ = stack
+    turns, shifts, axes, centres, halves, targets, kept, _, _, _ = stack
     copy_pose(turns[box], shifts[box], turns[at], shifts[at])
     copy_rotation(axes[box], axes[at])
     for k in range(3):
@@ -129,8 +109,8 @@ def search_poses(count, faces, contacts, model, angle, most, rotation, translati
     """
     first = model[2]
     readings, region = work[0], work[1]
-    x, u, _, weights = work[3]
-    turns, shifts, axes, centres, halves, targets, kept, space, facing = stack
+    x, u, levers, weights = work[3]
+    turns, shifts, axes, centres, halves, targets, kept, space, facing, shrinking = stack
     (ball, turned, best_turn), (shifted, best_shift, held, pivot), step = space
     form = work[2][0]
     chosen = targets[STACK]
@@ -147,7 +127,25 @@ def search_poses(count, faces, contacts, model, angle, most, rotation, translati
         pivot[k] /= max(used, 1)
     copy_pose(rotation, translation, turns[0], shifts[0])
     if angle < 1.5:
-        _box_region(region, axes[0], centres[0], halves[0], form)
+        box_region(region, axes[0], centres[0], halves[0], form)
+        carry(count, contacts[0], contacts[1], rotation, translation, x, u)
+        set_levers(count, faces, x, work[5][2], levers)
+        if not shrink_box(
+            count,
+            faces,
+            faces,
+            x,
+            levers,
+            u,
+            model,
+            contacts,
+            region,
+            axes[0],
+            centres[0],
+            halves[0],
+            shrinking,
+        ):
+            return REJECTED, 0
     else:
         for a in range(3):
             for b in range(3):
@@ -268,7 +266,7 @@ def search_poses(count, faces, contacts, model, angle, most, rotation, translati
         # The region that the verdict left may be smaller than the box.
         if _volume(region) < WORTHWHILE * halves[top, 0] * halves[top, 1] * halves[top, 2]:
             copy_pose(rotation, translation, turns[top], shifts[top])
-            _box_region(region, axes[top], centres[top], halves[top], form)
+            box_region(region, axes[top], centres[top], halves[top], form)
         _copy_weights(count, weights, kept[top])
         _halve(count, top, height, chosen, weights, stack)
         height += 1
@@ -296,4 +294,5 @@ def box_stack(count):
             np.empty(6),
         ),
         turn_space(count),
+        shrink_space(count),
     )

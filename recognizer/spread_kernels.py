@@ -17,7 +17,7 @@ from .compiling import borrowing
 from .feasibility_kernels import seek_feasible
 from .motion_kernels import add_row, copy_pose, move, slope_row
 from .proof_kernels import workspace
-from .reading_kernels import UNKNOWN_NORMAL, carry, read, worst_on_pieces
+from .reading_kernels import UNKNOWN_NORMAL, carry, meets_all
 from .verdict_kernels import EXACT, FEASIBLE
 
 NEWTON = 30
@@ -33,12 +33,9 @@ WIDTH = 6.0
 @borrowing
 def _allowed(count, faces, contacts, model, rotation, translation, work):
     """Whether a pose meets all bounds."""
-    readings, (x, u, _, _) = work[0], work[3]
+    x, u, spare = work[3][0], work[3][1], work[5][2]
     carry(count, contacts[0], contacts[1], rotation, translation, x, u)
-    if read(count, faces, faces, x, u, model, contacts, readings) > 1.0 + EXACT:
-        return False
-    exact, _ = worst_on_pieces(count, faces, faces, x, model, contacts, readings)
-    return exact <= 1.0 + EXACT
+    return meets_all(count, faces, x, u, model, contacts, EXACT, spare)
 
 
 @borrowing

@@ -451,3 +451,15 @@ def test_every_solid_of_the_tests_is_what_its_samplers_take_it_for():
         points, faces = surface_points(model(name), 50, np.random.default_rng(0), awkward=True)
         heights = (points * model(name).normals[faces]).sum(axis=1) - model(name).offsets[faces]
         assert np.abs(heights).max() < 1e-12
+
+
+@pytest.mark.parametrize("name", [*SOLIDS, *STAND_IN_NAMES])
+def test_balls_hold_their_faces_and_are_no_larger_than_need_be(name: str):
+    pieces = model(name).pieces
+    assert pieces.balls.shape == (model(name).face_count, 4)
+    for face, (*centre, radius) in enumerate(pieces.balls):
+        ends = pieces.start[[pieces.first[face], pieces.first[face + 1]]]
+        corners = pieces.corners[slice(*ends)]
+        assert np.linalg.norm(corners - centre, axis=1).max() == pytest.approx(radius)
+        span = np.linalg.norm(corners[:, None] - corners, axis=2).max()
+        assert 0.5 * span <= radius * (1.0 + 1e-9) <= np.sqrt(0.75) * span * (1.0 + 1e-6)
