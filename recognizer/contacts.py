@@ -155,6 +155,8 @@ class Contacts:
         The surface faces the probe: its normal is within a right angle of where it came from.
         """
         half_space = np.pi / 2.0 + APPROACH_ERROR
+        if not self.approaches.any():
+            return self
         vague = self.approach_known & (self.normal_error > half_space)
         if not vague.any():
             return self

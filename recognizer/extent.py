@@ -124,7 +124,8 @@ def _looked_around(
             tuple(np.empty((5, 3))),
         )
         rows[count : count + len(extra)], limits[count : count + len(extra)] = extra, extra_limits
-        known = (rows, limits, count + len(extra), -widest, widest, space)
+        count = polytope_kernels.drop_idle(rows, limits, count + len(extra), -widest, widest)
+        known = (rows, limits, count, -widest, widest, space)
         box = polytope_kernels.box_of(axes, *known)
         if not np.isfinite(box).all():
             continue  # none of its poses is near: those of a symmetry are

@@ -123,9 +123,11 @@ def cluster(
     # Groups are numbered by their first members, which are their best.
     order = np.argsort(groups, kind="stable")
     starts = np.searchsorted(groups[order], np.arange(groups.max() + 1))
-    prior = np.diag([1.0 / (np.pi * radius)] * 3 + [1.0 / radius] * 3) ** 2
-    covariances = np.linalg.inv(poses.informations + prior)
-    variances, motions = np.linalg.eigh(covariances)
+    prior = np.zeros((6, 6))
+    prior.flat[::7] = [1.0 / (np.pi * radius) ** 2] * 3 + [1.0 / radius**2] * 3
+    precisions, motions = np.linalg.eigh(poses.informations + prior)
+    variances = 1.0 / precisions
+    covariances = (motions * variances[:, None]) @ motions.transpose(0, 2, 1)
     log_volumes = 0.5 * np.log(variances).sum(axis=1) + np.log(len(model.symmetries))
     log_shares = log_volumes - 0.5 * poses.costs
     # Three standard deviations of each motion, against what the tolerance allows it: with bounded

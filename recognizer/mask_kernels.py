@@ -14,6 +14,9 @@ from .tree_kernels import ANGLE, COMPONENT, DISTANCE, TILT
 COLUMNS = 11
 """Rows of `pack_tables` a feature."""
 
+MANY = 6
+"""Features of a word above which all 64 are checked at once."""
+
 _ONE = np.uint64(1)
 _NONE = np.uint64(0)
 _DE_BRUIJN = np.uint64(0x03F79D71B4CB0A89)
@@ -116,33 +119,62 @@ def narrow(a, packed, half_angle, reading, error_i, error_j, switches, domain, k
         swing = np.arcsin(reach / length) if length > reach else np.pi
         bend_i, bend_j = error_i + half_angle + swing, error_j + swing
     count = 0
+    features = packed.shape[2]
     for w in range(len(domain)):
         bits = domain[w]
-        found = _NONE
+        if count_bits(bits) > MANY:
+            # Free of branches, so that it becomes vector instructions.
+            found = _NONE
+            for place in range(min(64, features - 64 * w)):
+                b = 64 * w + place
+                fits = (packed[a, 2, b] <= most_g) & (packed[a, 3, b] >= least_g)
+                fits &= (packed[a, 4, b] <= most_i) & (packed[a, 5, b] >= least_i)
+                fits &= (packed[a, 6, b] <= most_j) & (packed[a, 7, b] >= least_j)
+                fits &= (packed[a, 0, b] <= most_d) & (packed[a, 1, b] >= least_d)
+                found |= np.uint64(fits) << np.uint64(place)
+            bits &= found
+            if not switches & TILT:
+                kept[w] = bits
+                count += count_bits(bits)
+                continue
+        kept[w] = bits
         while bits != _NONE:
             lowest = bits & (~bits + _ONE)
             bits ^= lowest
             b = 64 * w + bit_index(lowest)
             # The angle first: it rules out most.
-            if packed[a, 2, b] > most_g or packed[a, 3, b] < least_g:
-                continue
-            if packed[a, 4, b] > most_i or packed[a, 5, b] < least_i:
-                continue
-            if packed[a, 6, b] > most_j or packed[a, 7, b] < least_j:
-                continue
-            if packed[a, 0, b] > most_d or packed[a, 1, b] < least_d:
-                continue
-            if switches & TILT and (
-                packed[a, 8, b] > reading[2] + bend_i
-                or packed[a, 9, b] < reading[2] - bend_i
-                or packed[b, 8, a] > reading[3] + bend_j + packed[a, 10, b]
-                or packed[b, 9, a] < reading[3] - bend_j - packed[a, 10, b]
+            if (
+                packed[a, 2, b] > most_g
+                or packed[a, 3, b] < least_g
+                or packed[a, 4, b] > most_i
+                or packed[a, 5, b] < least_i
+                or packed[a, 6, b] > most_j
+                or packed[a, 7, b] < least_j
+                or packed[a, 0, b] > most_d
+                or packed[a, 1, b] < least_d
+            ) or (
+                switches & TILT
+                and (
+                    packed[a, 8, b] > reading[2] + bend_i
+                    or packed[a, 9, b] < reading[2] - bend_i
+                    or packed[b, 8, a] > reading[3] + bend_j + packed[a, 10, b]
+                    or packed[b, 9, a] < reading[3] - bend_j - packed[a, 10, b]
+                )
             ):
-                continue
-            found |= lowest
-            count += 1
-        kept[w] = found
+                kept[w] ^= lowest
+            else:
+                count += 1
     return count
+
+
+@borrowing
+def count_bits(word):
+    """How many bits of a word are set."""
+    word -= (word >> np.uint64(1)) & np.uint64(0x5555555555555555)
+    pairs = word & np.uint64(0x3333333333333333)
+    word = pairs + ((word >> np.uint64(2)) & np.uint64(0x3333333333333333))
+    word = (word + (word >> np.uint64(4))) & np.uint64(0x0F0F0F0F0F0F0F0F)
+    return int((word * np.uint64(0x0101010101010101)) >> np.uint64(56))
 
 
 @borrowing

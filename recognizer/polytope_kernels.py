@@ -17,6 +17,25 @@ CUTS = 24
 MOST_CORNERS = 256
 
 
+@borrowing
+def drop_idle(rows, limits, count, low, high):
+    """Drop inequalities that all of a box meets, in place; returns how many are left.
+
+    Arguments as in `simplex_kernels.farthest`.
+    """
+    left = 0
+    for r in range(count):
+        most = 0.0
+        for k in range(6):
+            most += max(rows[r, k] * low[k], rows[r, k] * high[k])
+        if most > limits[r]:
+            for k in range(6):
+                rows[left, k] = rows[r, k]
+            limits[left] = limits[r]
+            left += 1
+    return left
+
+
 @njit(cache=True)
 def box_of(axes, rows, limits, count, low, high, space):
     """How far a polytope reaches along directions, there and back.

@@ -224,15 +224,15 @@ class Recognizer:
 
     def _check(self, contacts: Contacts, outliers: int) -> None:
         if contacts.dimension != self.dimension:
-            kinds = {2: "outlines of the plane", 3: "solids"}
+            kind = "solids" if self.dimension == 3 else "outlines of the plane"
             raise ValueError(
                 f"contacts have {contacts.dimension} coordinates, but the library is of"
-                f" {kinds[self.dimension]}: give {self.dimension}"
+                f" {kind}: give {self.dimension}"
             )
-        sharp = np.flatnonzero(contacts.kinds >= EDGE)
-        if sharp.size and not self._edges:
+        if not self._edges and (contacts.kinds >= EDGE).any():
+            sharp = int(np.argmax(contacts.kinds >= EDGE))
             raise ValueError(
-                f"contact {sharp[0]} is on an edge or a vertex, but this recogniser knows faces"
+                f"contact {sharp} is on an edge or a vertex, but this recogniser knows faces"
                 ' alone: make it with features="all"'
             )
         if outliers < 0:

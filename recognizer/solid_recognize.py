@@ -44,6 +44,8 @@ CELL_ANGLES = (0.04, 0.4)
 """... and its least and largest, radians, ..."""
 LEANING_CELL = 0.1
 """... and its least where some normals are known, which hold the lean: cells are for the turn."""
+ROUNDING = 1e-12
+"""Of a cosine."""
 FEWEST_FOR_CELLS = 3
 """Contacts from which on cells are worth their time: two leave nearly all rotations possible."""
 MOST_CELLS = 200_000
@@ -286,9 +288,9 @@ def _vague(contacts: Contacts) -> bool:
     normals, errors = contacts.normals[known], contacts.normal_error[known]
     if len(normals) < 2:
         return True
-    leaning = np.arccos(np.minimum(np.abs(normals @ normals[0]), 1.0))
     # If none surely leans away from the first, two others are about as parallel.
-    return bool((leaning <= errors[0] + errors).all())
+    parallel = np.cos(np.minimum(errors[0] + errors, np.pi / 2.0)) - ROUNDING
+    return bool((np.abs(normals @ normals[0]) >= parallel).all())
 
 
 def _finest(contacts: Contacts, radius: float) -> float:

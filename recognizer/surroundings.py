@@ -45,9 +45,7 @@ class Surroundings:
 
     def says_nothing(self, contacts: Contacts) -> bool:
         """Whether nothing is known, approaches of contacts included."""
-        return (
-            not len(self.free_space) and self.support is None and not contacts.approach_known.any()
-        )
+        return not len(self.free_space) and self.support is None and not contacts.approaches.any()
 
 
 def with_slots(features: Features, centroid: Floats, radius: float) -> tuple:

@@ -179,10 +179,9 @@ def spread_order(contacts: Contacts) -> NDArray[np.intp]:
     Returns:
         (n,) row indices.
     """
-    reach = float(np.ptp(contacts.positions, axis=0).max(initial=0.0))
-    scaled = contacts.positions / reach if reach > 0.0 else contacts.positions
-    order = tree_kernels.farthest_first(np.hstack([scaled, contacts.normals / 2.0]))
-    return order[np.argsort(contacts.kinds[order] >= EDGE, kind="stable")]
+    order = tree_kernels.spread_first(contacts.positions, contacts.normals)
+    sharp = contacts.kinds[order] >= EDGE
+    return order[np.argsort(sharp, kind="stable")] if sharp.any() else order
 
 
 def prune(

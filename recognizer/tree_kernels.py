@@ -63,6 +63,24 @@ def farthest_first(rows):
 
 
 @njit(cache=True)
+def spread_first(positions, normals):
+    """`farthest_first` by positions, as shares of their largest extent, and by half the normals."""
+    count, dimension = positions.shape
+    rows = np.empty((count, 2 * dimension))
+    reach = 0.0
+    for k in range(dimension):
+        least, most = np.inf, -np.inf
+        for i in range(count):
+            least, most = min(least, positions[i, k]), max(most, positions[i, k])
+        reach = max(reach, most - least)
+    for i in range(count):
+        for k in range(dimension):
+            rows[i, k] = positions[i, k] / reach if reach > 0.0 else positions[i, k]
+            rows[i, dimension + k] = normals[i, k] / 2.0
+    return farthest_first(rows)
+
+
+@njit(cache=True)
 def least_span(points, errors):
     """The least that the farthest two of (n, 3) points can be apart, (n,) bounds on each."""
     most = 0.0

@@ -43,6 +43,21 @@ def test_reaches_are_those_of_a_library_of_linear_programs():
         assert reach == pytest.approx(_linprog(objective, rows, limits), abs=1e-8)
 
 
+def test_inequalities_that_all_of_a_box_meets_say_nothing():
+    rng, dropped = np.random.default_rng(2), 0
+    for _ in range(100):
+        rows, limits = _polytope(rng)
+        limits += rng.uniform(0.0, 8.0 * BOX, len(limits))
+        objective = rng.standard_normal(6)
+        low, high = np.full(6, -BOX), np.full(6, BOX)
+        reach = farthest(objective, *_known(rows, limits))
+        left = polytope_kernels.drop_idle(rows, limits, len(rows), low, high)
+        dropped += len(rows) - left
+        known = rows[:left], limits[:left]
+        assert farthest(objective, *_known(*known)) == pytest.approx(reach, abs=1e-8)
+    assert dropped > 300
+
+
 def test_a_polytope_that_is_empty_reaches_nowhere():
     rows = np.array([[1.0, 0, 0, 0, 0, 0], [-1.0, 0, 0, 0, 0, 0]])
     assert farthest(np.ones(6), *_known(rows, np.array([-0.01, 0.005]))) == -np.inf

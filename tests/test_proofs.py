@@ -69,6 +69,7 @@ from palpate.recognizer.reading_kernels import (
     NO_CONE,
     RAY,
     cone_support,
+    meets_all,
     nearest_in_cone,
     nearest_on_arc,
     nearest_on_feature,
@@ -254,6 +255,22 @@ def test_a_pose_reads_as_the_checker_reads_it() -> None:
 
 
 # Algebra
+
+
+def test_bounds_are_all_met_where_no_reading_is_above_its_own() -> None:
+    rng, met, cases = np.random.default_rng(31), 0, 1500
+    for _ in range(cases):
+        sample = draw(rng)
+        _, rotation, translation = start_near(sample, rng, rng.choice([1e-9, 0.01, 0.3]))
+        translation = sample.true_translation + rng.normal(size=3) * rng.choice([0.0, 1e-3])
+        work, worst = read_at(sample, rotation, translation)
+        count, faces, targets, model, contacts = sample.question
+        x, u, spare = work[3][0], work[3][1], np.empty(3)
+        exact, _ = worst_on_pieces(count, faces, targets, x, model, contacts, work[0])
+        within = meets_all(count, faces, x, u, model, contacts, 1e-9, spare)
+        assert within == (max(worst, exact) <= 1.0 + 1e-9)
+        met += within
+    assert 0.2 * cases < met < 0.8 * cases
 
 
 def test_the_small_matrix_routines_do_what_numpy_does() -> None:
