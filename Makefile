@@ -126,7 +126,7 @@ $(DEV): pyproject.toml $(CREATED)
 # numba looks only at a kernel's own file to see whether its compiled code is stale, not at the
 # kernels it calls: so all are compiled anew when any has changed.
 $(COMPILED): $(wildcard recognizer/*_kernels.py policies/*_kernels.py) $(RUNTIME)
-	@echo "set-up: compiling the recogniser's kernels (once; three minutes or so)"
+	@echo "set-up: compiling the recogniser's kernels (once; three to five minutes)"
 	@rm -f recognizer/__pycache__/*_kernels.*.nb[ci] policies/__pycache__/*_kernels.*.nb[ci]
 	@$(BIN)/python -m palpate.recognizer.warm_up
 	@$(BIN)/python -m palpate.policies.warm_up
