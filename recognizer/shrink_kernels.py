@@ -95,6 +95,7 @@ def shrink_box(
         Whether any poses are left.
     """
     table, programs, (low, high, objective), vectors = space
+    rows, limits = table
     _, _, reaches, chords, sines = contacts
     _box_motions(region, axes, centre, half, model[6], low, high)
     objective[:] = 0.0
@@ -125,7 +126,7 @@ def shrink_box(
             for side in range(2):
                 sign = 2.0 * side - 1.0
                 objective[k] = sign
-                most = farthest(objective, *table, used, low, high, programs) + ROUNDING
+                most = farthest(objective, rows, limits, used, low, high, programs) + ROUNDING
                 if side == 1:
                     high[k] = min(high[k], most)
                 else:

@@ -23,8 +23,10 @@ BOX = 12
 
 @njit(cache=True)
 def simplex_space():
-    """Work space of a program: active rows (6,), the inverse of their matrix (6, 6), multipliers
-    (6,), a vertex (6,), a row's multipliers (6,), what is left over (6,).
+    """Work space of a program.
+
+    Active rows (6,), the inverse of their matrix (6, 6), multipliers (6,), a vertex (6,), a row's
+    multipliers (6,), and what is left over of an objective (6,).
     """
     return (
         np.empty(6, np.int64),

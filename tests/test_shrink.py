@@ -39,7 +39,7 @@ def test_a_turn_in_a_box_bends_a_lever_no_less_than_is_said() -> None:
     assert tightest < 1.2
 
 
-def _boxed(sample: Sample, rng: np.random.Generator) -> tuple[Any, Any, Floats] | None:
+def _boxed(sample: Sample, rng: np.random.Generator) -> tuple[Any, Any, Floats]:
     """A box about a pose near the truth, as a search starts with it: arguments, box, true motion.
 
     The motion is along the box's axes, its shift in radii.
@@ -58,6 +58,11 @@ def _boxed(sample: Sample, rng: np.random.Generator) -> tuple[Any, Any, Floats] 
     return arguments, (axes, centre, half), np.append(z[:3] @ axes, z[3:] @ axes / model[6])
 
 
+def _shrunk(arguments: Any, *box: Floats) -> bool:
+    shrink: Any = shrink_box  # its types are numba's
+    return shrink(*arguments, *box, shrink_space(arguments[0]))
+
+
 def test_a_shrunk_box_holds_the_truth() -> None:
     rng, shares = np.random.default_rng(2), []
     for case in range(2500):
@@ -68,7 +73,7 @@ def test_a_shrunk_box_holds_the_truth() -> None:
         before = half.copy()
         assert np.linalg.det(axes) == pytest.approx(1.0)
         assert (np.abs(z[:3] - centre) <= half + 1e-8).all()
-        left = shrink_box(*arguments, axes, centre, half, shrink_space(arguments[0]))
+        left = _shrunk(arguments, axes, centre, half)
         assert left, f"case {case}: no pose is said to be left"
         assert (np.abs(z[:3] - centre) <= half + 1e-8).all(), f"case {case}"
         assert (half <= before * (1.0 + 1e-9) + 1e-12).all()
@@ -126,6 +131,6 @@ def test_boxes_far_from_the_truth_are_often_said_to_be_empty() -> None:
         if abs(z[0] - centre[0]) <= half[0]:
             continue
         cases += 1
-        empty += not shrink_box(*arguments, axes, centre, half, shrink_space(arguments[0]))
+        empty += not _shrunk(arguments, axes, centre, half)
     assert cases > 30
     assert empty > 0.2 * cases
