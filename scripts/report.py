@@ -66,6 +66,7 @@ def write_report(folder: Path, page: Path) -> None:
     settings = read_settings(folder)
     rows = RowStore(folder).rows()
     policies = [str(name) for name in _list(settings["policies"])]
+    page.parent.mkdir(parents=True, exist_ok=True)
     blocks = _content(settings, rows, policies, page)
     if blocks is None:
         raise ValueError(

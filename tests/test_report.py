@@ -225,12 +225,13 @@ def test_the_html_page_needs_nothing_else(tmp_path):
 
 def test_figures_lie_beside_the_page_under_the_names_it_says(tmp_path):
     folder = played(tmp_path / "run", noise=("pi/8,0.05in", "pi/10,0.01in"))
-    write_report(folder, tmp_path / "results")
-    named = re.findall(r"\]\((.*?)\)", (tmp_path / "results.md").read_text())
+    beside = tmp_path / "to" / "be" / "made"
+    write_report(folder, beside / "results")
+    named = re.findall(r"\]\((.*?)\)", (beside / "results.md").read_text())
     assert len(named) == 6
     for name in named:
-        assert (tmp_path / name).read_bytes().startswith(b"<?xml")
-        assert (tmp_path / name).with_suffix(".pdf").read_bytes().startswith(b"%PDF")
+        assert (beside / name).read_bytes().startswith(b"<?xml")
+        assert (beside / name).with_suffix(".pdf").read_bytes().startswith(b"%PDF")
     assert sorted(p.name for p in folder.iterdir()) == [".lock", "config.json", "episodes.parquet"]
 
 
