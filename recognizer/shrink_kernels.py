@@ -37,6 +37,22 @@ def shrink_space(count):
 
 
 @borrowing
+def _reaches(region, first, axes, middle, wide):
+    """The middle of a region along axes, and how far it reaches from there, (3,) each in place.
+
+    Of its turns if ``first`` is 0, of its shifts if it is 3.
+    """
+    for k in range(3):
+        square = 0.0
+        middle[k] = 0.0
+        for a in range(3):
+            middle[k] += axes[a, k] * region[2][first + a]
+            for b in range(3):
+                square += axes[a, k] * region[1][first + a, first + b] * axes[b, k]
+        wide[k] = np.sqrt(max(square, 0.0)) * (1.0 + 1e-9)
+
+
+@borrowing
 def box_region(region, axes, centre, half, form):
     """The box around a region's rotations, about the pose that the region is about.
 
@@ -46,28 +62,7 @@ def box_region(region, axes, centre, half, form):
         for b in range(3):
             form[a, b] = region[1][a, b]
     diagonalise(form, axes)
-    for k in range(3):
-        square = 0.0
-        centre[k] = 0.0
-        for a in range(3):
-            centre[k] += axes[a, k] * region[2][a]
-            for b in range(3):
-                square += axes[a, k] * region[1][a, b] * axes[b, k]
-        half[k] = np.sqrt(max(square, 0.0)) * (1.0 + 1e-9)
-
-
-@borrowing
-def _box_motions(region, axes, centre, half, radius, low, high):
-    """A box of rotations, radians, and the one of the region's shifts, radii; along its axes."""
-    for k in range(3):
-        low[k], high[k] = centre[k] - half[k], centre[k] + half[k]
-        middle, square = 0.0, 0.0
-        for a in range(3):
-            middle += axes[a, k] * region[2][3 + a]
-            for b in range(3):
-                square += axes[a, k] * region[1][3 + a, 3 + b] * axes[b, k]
-        wide = np.sqrt(max(square, 0.0)) * (1.0 + 1e-9)
-        low[3 + k], high[3 + k] = (middle - wide) / radius, (middle + wide) / radius
+    _reaches(region, 0, axes, centre, half)
 
 
 @borrowing
@@ -97,7 +92,12 @@ def shrink_box(
     table, programs, (low, high, objective), vectors = space
     rows, limits = table
     _, _, reaches, chords, sines = contacts
-    _box_motions(region, axes, centre, half, model[6], low, high)
+    middle, wide = vectors[0], vectors[1]
+    _reaches(region, 3, axes, middle, wide)
+    for k in range(3):
+        low[k], high[k] = centre[k] - half[k], centre[k] + half[k]
+        # Shifts, in radii.
+        low[3 + k], high[3 + k] = (middle[k] - wide[k]) / model[6], (middle[k] + wide[k]) / model[6]
     objective[:] = 0.0
     for _ in range(ROUNDS):
         square = 0.0
