@@ -31,10 +31,36 @@ SAME = 1e-20
 """The same below which two circles about one axis are one, or don't meet."""
 
 
+WALK = 6
+"""Points that are looked at on the way from a cap's middle, each on the circle that the last one
+was farthest beyond: mostly the third or so is beyond none."""
+OVERSHOOT = 0.1
+"""By how much that one is inside its circle, as a share of how far the last was outside."""
+
+
 @njit(cache=True)
 def lean_space(count):
-    """Work space for so many contacts: axes and bounds of circles; a group's members and signs."""
-    return np.empty((MOST + 1, 3)), np.empty(MOST + 1), np.empty(count, np.int64), np.empty(count)
+    """Work space for so many contacts: circles, a core of them, a group's members and signs.
+
+    Of circles: axes, bounds. Of a core: axes, bounds, numbers.
+    """
+    return (
+        (np.empty((MOST + 1, 3)), np.empty(MOST + 1)),
+        (np.empty((MOST + 1, 3)), np.empty(MOST + 1), np.empty(MOST + 1, np.int64)),
+        np.empty(count, np.int64),
+        np.empty(count),
+    )
+
+
+@borrowing
+def _most_beyond(axes, limits, count, x, y, z):
+    """The circle that a point of the sphere is farthest beyond, and how far; -1 if none surely."""
+    worst, where = SLACK, -1
+    for k in range(count):
+        beyond = axes[k, 0] * x + axes[k, 1] * y + axes[k, 2] * z - limits[k]
+        if beyond > worst:
+            worst, where = beyond, k
+    return where, worst
 
 
 @borrowing
@@ -47,20 +73,23 @@ def _beyond(axes, limits, count, x, y, z):
 
 
 @borrowing
-def _some_direction(axes, limits, count):
-    """Whether some unit v has ``axes[k] . v <= limits[k]`` for all k, or may have."""
+def _corner(axes, limits, count):
+    """A point within all circles: one of any circle, or one where two of them meet.
+
+    Returns:
+        Whether there is one, or may be one that isn't known well; whether it is known; the point.
+    """
     for k in range(count):
         if limits[k] < -1.0 - SLACK:
-            return False
+            return False, False, (0.0, 0.0, 0.0)
         # Any point of the circle.
         a, b, c = axes[k, 0], axes[k, 1], axes[k, 2]
         x, y, z = perpendicular(a, b, c)
         height = min(max(limits[k], -1.0), 1.0)
         far = np.sqrt(max(1.0 - height * height, 0.0))
-        if not _beyond(
-            axes, limits, count, height * a + far * x, height * b + far * y, height * c + far * z
-        ):
-            return True
+        x, y, z = height * a + far * x, height * b + far * y, height * c + far * z
+        if not _beyond(axes, limits, count, x, y, z):
+            return True, True, (x, y, z)
     for k in range(count):
         a, b, c = axes[k, 0], axes[k, 1], axes[k, 2]
         for j in range(k):
@@ -69,7 +98,7 @@ def _some_direction(axes, limits, count):
             square = x * x + y * y + z * z
             if square < SKEW:
                 if square > SAME:
-                    return True
+                    return True, False, (0.0, 0.0, 0.0)
                 continue
             cosine = a * d + b * e + c * f
             first = (limits[k] - cosine * limits[j]) / square
@@ -80,22 +109,80 @@ def _some_direction(axes, limits, count):
                 continue
             far = np.sqrt(max(rest, 0.0) / square)
             for side in (-far, far):
-                if not _beyond(axes, limits, count, p + side * x, q + side * y, r + side * z):
-                    return True
-    return False
+                u, v, w = p + side * x, q + side * y, r + side * z
+                if not _beyond(axes, limits, count, u, v, w):
+                    return True, True, (u, v, w)
+    return False, False, (0.0, 0.0, 0.0)
 
 
 @borrowing
-def _add(axes, limits, count, a, b, c, limit, x, y, z, angle):
-    """Add ``(a, b, c) . v <= limit``, of a unit axis, if it cuts the cap about (x, y, z).
+def _some_direction(axes, limits, count, x, y, z, core):
+    """Whether some unit v has ``axes[k] . v <= limits[k]`` for all k, or may have.
+
+    From a first guess (x, y, z) on, a point beyond some circle adds that circle to a core. At first
+    the next point is the one of that circle nearest to the last, then a point within all of the
+    core. A core without any is a proof, and it is mostly a few of dozens.
+    """
+    core_axes, core_limits, numbers = core
+    used = 0
+    for step in range(WALK + count + 1):
+        k, excess = _most_beyond(axes, limits, count, x, y, z)
+        if k < 0:
+            return True
+        a, b, c = axes[k, 0], axes[k, 1], axes[k, 2]
+        known = False
+        for j in range(used):
+            known |= numbers[j] == k
+        if not known:
+            core_axes[used, 0], core_axes[used, 1], core_axes[used, 2] = a, b, c
+            core_limits[used], numbers[used] = limits[k], k
+            used += 1
+        if step < WALK:
+            height = excess + limits[k]
+            x, y, z = x - height * a, y - height * b, z - height * c
+            length = np.sqrt(x * x + y * y + z * z)
+            if length < 1e-6:
+                x, y, z = perpendicular(a, b, c)
+                length = 1.0
+            # A little inside: what walks along two circles would come near their corner only.
+            height = min(max(limits[k] - OVERSHOOT * excess, -1.0), 1.0)
+            far = np.sqrt(1.0 - height * height) / length
+            x, y, z = height * a + far * x, height * b + far * y, height * c + far * z
+        else:
+            some, sure, (x, y, z) = _corner(core_axes, core_limits, used)
+            if not some:
+                return False
+            if not sure:
+                return True
+    return True
+
+
+@borrowing
+def _add(axes, limits, count, a, b, c, limit, cap):
+    """Add ``(a, b, c) . v <= limit``, of a unit axis, if it cuts a cap.
+
+    Args:
+        axes: (m, 3) of the circles so far, ...
+        limits: (m,) their bounds.
+        count: how many there are.
+        a: the axis ...
+        b: ...
+        c: ...
+        limit: and its bound.
+        cap: middle (x, y, z), cosine and sine of its angle, which is below a right one.
 
     Returns:
         How many there are then; -1 if it leaves nothing of the cap.
     """
-    leaning = np.arccos(min(max(a * x + b * y + c * z, -1.0), 1.0))
-    if limit < np.cos(min(leaning + angle, np.pi)) - SLACK:
+    x, y, z, narrow, wide = cap
+    cosine = min(max(a * x + b * y + c * z, -1.0), 1.0)
+    across = wide * np.sqrt(1.0 - cosine * cosine)
+    # Of the cap, the axis has this at least, and this at most.
+    least = cosine * narrow - across if cosine > -narrow else -1.0
+    if limit < least - SLACK:
         return -1
-    if limit >= np.cos(max(leaning - angle, 0.0)) or count == MOST:
+    most = cosine * narrow + across if cosine < narrow else 1.0
+    if limit >= most or count == MOST:
         return count
     axes[count, 0], axes[count, 1], axes[count, 2] = a, b, c
     limits[count] = limit
@@ -105,7 +192,8 @@ def _add(axes, limits, count, a, b, c, limit, x, y, z, angle):
 @borrowing
 def _group_leans(size, members, signs, faces, contacts, errors, model, x, y, z, angle, space):
     """Whether the normal of a group of parallel faces has a direction in a cap about (x, y, z)."""
-    axes, limits, _, _ = space
+    (axes, limits), core, _, _ = space
+    cap = (x, y, z, np.cos(angle), np.sin(angle))
     points, measured, reaches, _, _ = contacts
     offsets, radius = model[1], model[6]
     count = 0
@@ -113,7 +201,7 @@ def _group_leans(size, members, signs, faces, contacts, errors, model, x, y, z, 
         i, sign = members[g], signs[g]
         if errors[i] < np.pi:
             u, v, w = -sign * measured[i, 0], -sign * measured[i, 1], -sign * measured[i, 2]
-            count = _add(axes, limits, count, u, v, w, -np.cos(errors[i]), x, y, z, angle)
+            count = _add(axes, limits, count, u, v, w, -np.cos(errors[i]), cap)
             if count < 0:
                 return False
         for h in range(g):
@@ -140,18 +228,15 @@ def _group_leans(size, members, signs, faces, contacts, errors, model, x, y, z, 
                     side * b,
                     side * c,
                     (side * rise + room) / length,
-                    x,
-                    y,
-                    z,
-                    angle,
+                    cap,
                 )
                 if count < 0:
                     return False
     if count == 0:
         return True
     axes[count, 0], axes[count, 1], axes[count, 2] = -x, -y, -z
-    limits[count] = -np.cos(angle)
-    return _some_direction(axes, limits, count + 1)
+    limits[count] = -cap[3]
+    return _some_direction(axes, limits, count + 1, x, y, z, core)
 
 
 @borrowing
