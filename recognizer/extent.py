@@ -106,7 +106,7 @@ def _looked_around(
     extra, extra_limits = _support_rows(test, hypothesis, turn, support, stable)
     size = len(contacts) * (extent_kernels.ROWS_OF_ONE + corners) + len(extra)
     rows, limits = np.empty((size, 6)), np.empty(size)
-    space = simplex_space()
+    columns, space = np.empty((7, size)), simplex_space(size)
     widest = np.full(6, 4.0 * float(allowed.max()))
     boxes, alike = [], True
     for faces in hypothesis.interpretations:
@@ -124,8 +124,10 @@ def _looked_around(
             tuple(np.empty((5, 3))),
         )
         rows[count : count + len(extra)], limits[count : count + len(extra)] = extra, extra_limits
-        count = polytope_kernels.drop_idle(rows, limits, count + len(extra), -widest, widest)
-        known = (rows, limits, count, -widest, widest, space)
+        count = polytope_kernels.take_needed(
+            rows, limits, count + len(extra), -widest, widest, columns
+        )
+        known = (columns, count, -widest, widest, space)
         box = polytope_kernels.box_of(axes, *known)
         if not np.isfinite(box).all():
             continue  # none of its poses is near: those of a symmetry are

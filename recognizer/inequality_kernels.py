@@ -65,29 +65,28 @@ def _add(a, m, shifts, room, box, used, table):
         room: how much.
         box: (6,) low, (6,) high, and a bound on the square of its turns.
         used: how many inequalities there are.
-        table: rows (r, 6) and limits (r,).
+        table: (7, r) of each inequality its row and its limit.
 
     Returns:
         How many there are then.
     """
-    rows, limits = table
     low, high, _ = box
-    if used == len(limits):
+    if used == table.shape[1]:
         return used
-    rows[used, 0] = a[2] * m[1] - a[1] * m[2]
-    rows[used, 1] = a[0] * m[2] - a[2] * m[0]
-    rows[used, 2] = a[1] * m[0] - a[0] * m[1]
+    table[0, used] = a[2] * m[1] - a[1] * m[2]
+    table[1, used] = a[0] * m[2] - a[2] * m[0]
+    table[2, used] = a[1] * m[0] - a[0] * m[1]
     for k in range(3):
-        rows[used, 3 + k] = -m[k] if shifts else 0.0
+        table[3 + k, used] = -m[k] if shifts else 0.0
     most = 0.0
     for k in range(6):
-        most += max(rows[used, k] * low[k], rows[used, k] * high[k])
+        most += max(table[k, used] * low[k], table[k, used] * high[k])
     if most <= room:
         return used
     room -= least_bend(a, m, box)
     if most <= room:
         return used
-    limits[used] = room + ROUNDING
+    table[6, used] = room + ROUNDING
     return used + 1
 
 
@@ -146,7 +145,8 @@ def add_contact(contact, f, polygon, model, bounds, axes, box, used, table, spac
         axes: (3, 3) columns, right-handed, object frame.
         box: (6,) low, (6,) high, and a bound on the square of its turns.
         used: how many inequalities there are.
-        table: rows (r, 6) and limits (r,), written in place; what finds no room is left out.
+        table: (7, r) of each inequality its row and its limit, written in place; what finds no
+            room is left out.
         space: five (3,) vectors.
 
     Returns:

@@ -7,23 +7,39 @@ A place is that of a contact along a direction. A small motion ``z = (w, s)`` lo
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 
-from .compiling import borrowing
+from .compiling import borrowing, vectorised
 from .polygon_kernels import INSIDE
+
+
+@njit(cache=True)
+def place_table(count):
+    """Room for so many places.
+
+    Returns:
+        (m, 6) how motions lower each; (10, m) of each the first three of these, its direction, its
+        lever, and the lever along the direction; (6, m) its value, its bound, its weight, its bound
+        widened by the remainder, and where it is beyond an edge, the excess and its least possible
+        value, else zeros.
+    """
+    return np.empty((count, 6)), np.empty((10, count)), np.empty((6, count))
 
 
 @borrowing
 def _add_row(lever, direction, value, limit, at, table):
     """Note a place along a direction."""
-    rows, numbers = table
+    rows, columns, numbers = table
     a0, a1, a2 = lever[0], lever[1], lever[2]
     d0, d1, d2 = direction
     rows[at, 0] = a1 * d2 - a2 * d1
     rows[at, 1] = a2 * d0 - a0 * d2
     rows[at, 2] = a0 * d1 - a1 * d0
     rows[at, 3], rows[at, 4], rows[at, 5] = d0, d1, d2
-    rows[at, 6], rows[at, 7], rows[at, 8] = a0, a1, a2
-    rows[at, 9] = a0 * d0 + a1 * d1 + a2 * d2
+    for k in range(6):
+        columns[k, at] = rows[at, k]
+    columns[6, at], columns[7, at], columns[8, at] = a0, a1, a2
+    columns[9, at] = a0 * d0 + a1 * d1 + a2 * d2
     numbers[0, at] = value
     numbers[1, at] = limit
     numbers[2, at] = 1.0
@@ -47,9 +63,7 @@ def note_places(count, faces, targets, x, levers, model, reaches, readings, tabl
         model: see `search_kernels.search_model`.
         reaches: (n,) bounds on distances, metres.
         readings: see `reading_kernels.read`.
-        table: (2n, 10) by place: how motions lower it (6), the lever, and the lever along the
-            direction; (6, 2n) its value, its bound, its weight, its bound widened by the remainder,
-            and where it is beyond an edge, the excess and its least possible value, else zeros.
+        table: see `place_table`; written in place.
     """
     normals, start, corners = model[0], model[3], model[4]
     gaps, _, heights, regions, _, _, _ = readings
@@ -79,36 +93,36 @@ def note_places(count, faces, targets, x, levers, model, reaches, readings, tabl
             least = min(least, along)
         half = 0.5 * (most - least)
         _add_row(levers[i], (d0, d1, d2), half + out, half + reaches[i], used, table)
-        table[1][4, used] = out - reaches[i]
-        table[1][5, used] = -2.0 * (half + reaches[i])
+        table[2][4, used] = out - reaches[i]
+        table[2][5, used] = -2.0 * (half + reaches[i])
         used += 1
     return used
 
 
-@borrowing
+@vectorised
 def widen_places(used, table, root, angle):
     """Widen each bound by the remainder of a region's turns: see `region_kernels.remainder`.
 
     Args:
         used: how many places there are.
-        table: see `note_places`.
+        table: see `place_table`.
         root: (3, 3) lower L; the region's ``w`` are ``L v`` with ``|v| <= 1``.
         angle: bounds |w|, radians.
     """
-    rows, numbers = table
+    _, columns, numbers = table
     l00, l10, l11 = root[0, 0], root[1, 0], root[1, 1]
     l20, l21, l22 = root[2, 0], root[2, 1], root[2, 2]
     g00, g11, g22 = l00 * l00 + l10 * l10 + l20 * l20, l11 * l11 + l21 * l21, l22 * l22
     g01, g02, g12 = l10 * l11 + l20 * l21, l20 * l22, l21 * l22
     third = angle * angle / 6.0
     for r in range(used):
-        d0, d1, d2 = rows[r, 3], rows[r, 4], rows[r, 5]
-        a0, a1, a2 = rows[r, 6], rows[r, 7], rows[r, 8]
+        d0, d1, d2 = columns[3, r], columns[4, r], columns[5, r]
+        a0, a1, a2 = columns[6, r], columns[7, r], columns[8, r]
         p0, p1, p2 = l00 * a0 + l10 * a1 + l20 * a2, l11 * a1 + l21 * a2, l22 * a2
         q0, q1, q2 = l00 * d0 + l10 * d1 + l20 * d2, l11 * d1 + l21 * d2, l22 * d2
-        c0, c1, c2 = rows[r, 0], rows[r, 1], rows[r, 2]
+        c0, c1, c2 = columns[0, r], columns[1, r], columns[2, r]
         t0, t1, t2 = l00 * c0 + l10 * c1 + l20 * c2, l11 * c1 + l21 * c2, l22 * c2
-        along = rows[r, 9]
+        along = columns[9, r]
         f00, f11, f22 = p0 * q0 - along * g00, p1 * q1 - along * g11, p2 * q2 - along * g22
         f01 = 0.5 * (p0 * q1 + p1 * q0) - along * g01
         f02 = 0.5 * (p0 * q2 + p2 * q0) - along * g02
@@ -125,14 +139,14 @@ def add_places(used, table, system, slope):
 
     Args:
         used: how many places there are.
-        table: see `note_places`.
+        table: see `place_table`.
         system: (6, 6) of the form, added to in place.
         slope: (6,) likewise.
 
     Returns:
         What the squares may have together beyond what they have at the pose itself.
     """
-    rows, numbers = table
+    rows, _, numbers = table
     allowed = 0.0
     for r in range(used):
         weight, wide = numbers[2, r], numbers[3, r]
@@ -168,7 +182,7 @@ def narrow_places(used, table, centre, inverse):
     Returns:
         Whether every one can come back inside at all.
     """
-    rows, numbers = table
+    rows, _, numbers = table
     for r in range(used):
         if numbers[5, r] == 0.0:
             continue
@@ -189,21 +203,18 @@ def narrow_places(used, table, centre, inverse):
     return True
 
 
-@borrowing
+@vectorised
 def raise_places(used, table, middle):
-    """Count each place by how large the fit of a round leaves it; returns the sum of the weights.
+    """Count each place by how large the fit of a round leaves it.
 
     Args:
         used: how many places there are.
-        table: see `note_places`.
+        table: see `place_table`.
         middle: (6,) the fit's motion.
     """
-    rows, numbers = table
-    total = 0.0
+    _, columns, numbers = table
+    w0, w1, w2, s0, s1, s2 = middle[0], middle[1], middle[2], middle[3], middle[4], middle[5]
     for r in range(used):
-        value = numbers[0, r]
-        for a in range(6):
-            value -= rows[r, a] * middle[a]
+        value = numbers[0, r] - columns[0, r] * w0 - columns[1, r] * w1 - columns[2, r] * w2
+        value -= columns[3, r] * s0 + columns[4, r] * s1 + columns[5, r] * s2
         numbers[2, r] *= min(abs(value) / numbers[3, r], 10.0) + 0.05
-        total += numbers[2, r]
-    return total

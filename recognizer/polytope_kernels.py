@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 
 from .compiling import borrowing
-from .simplex_kernels import farthest
+from .simplex_kernels import farther, farthest
 
 CUTS = 24
 """Planes that are cut off the shadow of a polytope; one that takes more counts as too long."""
@@ -18,10 +18,16 @@ MOST_CORNERS = 256
 
 
 @borrowing
-def drop_idle(rows, limits, count, low, high):
-    """Drop inequalities that all of a box meets, in place; returns how many are left.
+def take_needed(rows, limits, count, low, high, columns):
+    """Take over the inequalities that not all of a box meets; returns how many they are.
 
-    Arguments as in `simplex_kernels.farthest`.
+    Args:
+        rows: (m, 6) of the inequalities ``rows @ z <= limits``, of which ``count`` count.
+        limits: (m,) likewise.
+        count: how many.
+        low: (6,) the box.
+        high: (6,) likewise.
+        columns: see `simplex_kernels.farthest`; written in place.
     """
     left = 0
     for r in range(count):
@@ -30,20 +36,19 @@ def drop_idle(rows, limits, count, low, high):
             most += max(rows[r, k] * low[k], rows[r, k] * high[k])
         if most > limits[r]:
             for k in range(6):
-                rows[left, k] = rows[r, k]
-            limits[left] = limits[r]
+                columns[k, left] = rows[r, k]
+            columns[6, left] = limits[r]
             left += 1
     return left
 
 
 @njit(cache=True)
-def box_of(axes, rows, limits, count, low, high, space):
+def box_of(axes, columns, count, low, high, space):
     """How far a polytope reaches along directions, there and back.
 
     Args:
         axes: (k, 6) unit directions.
-        rows: see `simplex_kernels.farthest`, as are the others.
-        limits: likewise.
+        columns: see `simplex_kernels.farthest`, as are the others.
         count: likewise.
         low: likewise.
         high: likewise.
@@ -59,7 +64,8 @@ def box_of(axes, rows, limits, count, low, high, space):
             sign = 2.0 * side - 1.0
             for k in range(6):
                 objective[k] = sign * axes[a, k]
-            found[a, side] = sign * farthest(objective, rows, limits, count, low, high, space)
+            program = (objective, columns, count, low, high, space)
+            found[a, side] = sign * (farthest(*program) if a + side == 0 else farther(*program))
     return found
 
 
@@ -116,7 +122,7 @@ def _cut(planes, heights, number, corners, height):
 
 
 @njit(cache=True)
-def all_within(first, axes, box, allowed, rows, limits, count, low, high, space):
+def all_within(first, axes, box, allowed, columns, count, low, high, space):
     """Whether three of the six motions together are nowhere longer in a polytope than is allowed.
 
     The largest length of a convex set's points is sought from outside: its shadow on the three
@@ -129,8 +135,7 @@ def all_within(first, axes, box, allowed, rows, limits, count, low, high, space)
         axes: (3, 3) orthonormal directions among them.
         box: (3, 2) how far the polytope reaches along these.
         allowed: metres.
-        rows: see `simplex_kernels.farthest`, as are the others.
-        limits: likewise.
+        columns: see `simplex_kernels.farthest`, as are the others.
         count: likewise.
         low: likewise.
         high: likewise.
@@ -170,7 +175,7 @@ def all_within(first, axes, box, allowed, rows, limits, count, low, high, space)
         for k in range(3):
             planes[number, k] = corners[where, k] / longest
             objective[first + k] = planes[number, k]
-        heights[number] = farthest(objective, rows, limits, count, low, high, space)
+        heights[number] = farther(objective, columns, count, low, high, space)
         if heights[number] > allowed:
             return False
         number += 1

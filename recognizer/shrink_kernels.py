@@ -15,7 +15,7 @@ from numba import njit
 from .align_kernels import diagonalise
 from .compiling import borrowing
 from .inequality_kernels import ROUNDING, add_contact
-from .simplex_kernels import farthest, simplex_space
+from .simplex_kernels import farther, farthest, simplex_space
 
 ROOM = 24
 """Inequalities of a contact, on average, that there is room for; what finds none is left out."""
@@ -29,8 +29,8 @@ WORTHWHILE = 0.6
 def shrink_space(count):
     """Work space of `shrink_box` for a number of contacts."""
     return (
-        (np.empty((count * ROOM, 6)), np.empty(count * ROOM)),
-        simplex_space(),
+        np.empty((7, count * ROOM)),
+        simplex_space(count * ROOM),
         (np.empty(6), np.empty(6), np.empty(6)),
         (np.empty(3), np.empty(3), np.empty(3), np.empty(3), np.empty(3)),
     )
@@ -90,7 +90,6 @@ def shrink_box(
         Whether any poses are left.
     """
     table, programs, (low, high, objective), vectors = space
-    rows, limits = table
     _, _, reaches, chords, sines = contacts
     middle, wide = vectors[0], vectors[1]
     _reaches(region, 3, axes, middle, wide)
@@ -126,7 +125,8 @@ def shrink_box(
             for side in range(2):
                 sign = 2.0 * side - 1.0
                 objective[k] = sign
-                most = farthest(objective, rows, limits, used, low, high, programs) + ROUNDING
+                program = (objective, table, used, low, high, programs)
+                most = (farthest(*program) if k + side == 0 else farther(*program)) + ROUNDING
                 if side == 1:
                     high[k] = min(high[k], most)
                 else:

@@ -9,9 +9,10 @@ from sensing import SMALL, feel, sense_grid, touch_faces
 from palpate.recognizer import Polyhedron, Recognizer, polytope_kernels, pose_difference
 from palpate.recognizer import extent_kernels as kernels
 from palpate.recognizer.pose import kernel_contacts
-from palpate.recognizer.simplex_kernels import farthest, simplex_space
+from palpate.recognizer.simplex_kernels import farther, farthest, simplex_space
 
 BOX = 0.02
+SIDES = np.full(6, BOX)
 
 
 def _polytope(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
@@ -22,16 +23,17 @@ def _polytope(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     return rows, limits
 
 
-def _linprog(objective, rows, limits) -> float:
-    box = [(-BOX, BOX)] * 6
+def _linprog(objective, rows, limits, low=-SIDES, high=SIDES) -> float:
+    box = np.column_stack([low, high]) / BOX
     given = {"A_ub": rows, "b_ub": limits} if len(rows) else {}
     # Scaled: the solver's tolerances are meant for numbers about one.
     scaled = {"A_ub": rows, "b_ub": limits / BOX} if given else {}
-    return -BOX * linprog(-objective, bounds=[(-1.0, 1.0)] * len(box), **scaled).fun
+    return -BOX * linprog(-objective, bounds=box, **scaled).fun
 
 
 def _known(rows, limits):
-    return rows, limits, len(rows), np.full(6, -BOX), np.full(6, BOX), simplex_space()
+    columns, space = np.vstack([rows.T, limits]), simplex_space(len(rows))
+    return columns, len(rows), -SIDES, SIDES.copy(), space
 
 
 def test_reaches_are_those_of_a_library_of_linear_programs():
@@ -43,6 +45,27 @@ def test_reaches_are_those_of_a_library_of_linear_programs():
         assert reach == pytest.approx(_linprog(objective, rows, limits), abs=1e-8)
 
 
+def test_a_reach_from_where_the_last_program_ended_is_that_from_the_start():
+    rng, beyond = np.random.default_rng(3), 0
+    for _ in range(100):
+        known = _known(*_polytope(rng))
+        columns, _, low, high, _ = known
+        last = np.inf
+        for _ in range(8):
+            objective = rng.standard_normal(6) * (rng.random(6) < 0.7)
+            reach = farther(objective, *known)
+            assert reach == pytest.approx(
+                _linprog(objective, columns[:6].T, columns[6], low, high), abs=1e-8
+            )
+            beyond += reach > last
+            last = reach
+            # A box shrunk to what holds the polytope, as a search shrinks it.
+            axis = np.eye(6)[rng.integers(6)]
+            high -= axis * (high - np.minimum(farther(axis, *known) + 1e-9, high))
+            low += axis * (np.maximum(-farther(-axis, *known) - 1e-9, low) - low)
+    assert beyond > 100
+
+
 def test_inequalities_that_all_of_a_box_meets_say_nothing():
     rng, dropped = np.random.default_rng(2), 0
     for _ in range(100):
@@ -51,9 +74,10 @@ def test_inequalities_that_all_of_a_box_meets_say_nothing():
         objective = rng.standard_normal(6)
         low, high = np.full(6, -BOX), np.full(6, BOX)
         reach = farthest(objective, *_known(rows, limits))
-        left = polytope_kernels.drop_idle(rows, limits, len(rows), low, high)
+        columns = np.empty((7, len(rows)))
+        left = polytope_kernels.take_needed(rows, limits, len(rows), low, high, columns)
         dropped += len(rows) - left
-        known = rows[:left], limits[:left]
+        known = columns[:6, :left].T, columns[6, :left]
         assert farthest(objective, *_known(*known)) == pytest.approx(reach, abs=1e-8)
     assert dropped > 300
 

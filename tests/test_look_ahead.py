@@ -15,20 +15,23 @@ import oracles
 import pytest
 from checker import Oracle
 from numpy.typing import NDArray
+from proof_samples import direction
 from scipy.spatial.transform import Rotation
 from sensing import CUBE, HOLED, L_BLOCK, Touches, feel, forget_normals, touch_features
 
 from palpate.recognizer import Contacts, PairTables
 from palpate.recognizer.align_kernels import middle_translation
+from palpate.recognizer.cone_kernels import add_cones, cone_table, note_cones, raise_cones
 from palpate.recognizer.features import all_features
 from palpate.recognizer.forward_kernels import check_forward, take_lowest
 from palpate.recognizer.look_ahead_kernels import drop_beyond_region, drop_rejected
 from palpate.recognizer.mask_kernels import pair_readings
-from palpate.recognizer.place_kernels import add_places, widen_places
+from palpate.recognizer.place_kernels import add_places, raise_places, widen_places
 from palpate.recognizer.pose import ModelTest, kernel_contacts
 from palpate.recognizer.pose_kernels import start_pose
 from palpate.recognizer.proof_kernels import locate, workspace
 from palpate.recognizer.ranges import pack_tables
+from palpate.recognizer.reading_kernels import RAY
 from palpate.recognizer.region_kernels import remainder
 from palpate.recognizer.search_kernels import INNER_STEPS, VAGUE
 from palpate.recognizer.tree import Constraints
@@ -269,21 +272,23 @@ def test_a_contact_that_may_be_on_none_takes_no_truth_away(choices: int) -> None
 def test_places_are_widened_by_the_remainder_of_a_region() -> None:
     rng = np.random.default_rng(7)
     for _ in range(100):
-        (rows, numbers), root = places(rng), np.tril(rng.normal(size=(3, 3)))
+        table, root = places(rng), np.tril(rng.normal(size=(3, 3)))
+        _, columns, numbers = table
         angle, expected = rng.uniform(0.0, np.pi), numbers.copy()
         for r in range(5):
-            expected[3, r] = numbers[1, r] + remainder(rows[r, 6:9], rows[r, 3:6], root, angle)
-        widen_places(5, (rows, numbers), root, angle)
+            way, lever = columns[3:6, r].copy(), columns[6:9, r].copy()
+            expected[3, r] = numbers[1, r] + remainder(lever, way, root, angle)
+        widen_places(5, table, root, angle)
         np.testing.assert_allclose(numbers, expected, rtol=1e-12)
 
 
 def test_places_add_the_squares_of_what_motions_leave_of_them() -> None:
     rng = np.random.default_rng(8)
     for _ in range(100):
-        rows, numbers = places(rng)
+        rows, _, numbers = table = places(rng)
         system, slope = rng.normal(size=(6, 6)), rng.normal(size=6)
         added, steeper = system.copy(), slope.copy()
-        allowed = add_places(5, (rows, numbers), added, steeper)
+        allowed = add_places(5, table, added, steeper)
         share, weight = numbers[0, :5] / numbers[3, :5], numbers[2, :5]
         scaled = rows[:5, :6] / numbers[3, :5, None]
         np.testing.assert_allclose(added - system, (scaled.T * weight) @ scaled, atol=1e-12)
@@ -291,9 +296,54 @@ def test_places_add_the_squares_of_what_motions_leave_of_them() -> None:
         assert allowed == pytest.approx((weight * (1.0 - share**2)).sum())
 
 
-def places(rng: np.random.Generator) -> tuple[Floats, Floats]:
-    """A table of seven places as `note_places` has it, with levers and directions at random."""
+def test_cones_add_no_more_than_what_turns_leave_of_their_misses() -> None:
+    rng, tightest = np.random.default_rng(9), np.inf
+    for _ in range(300):
+        count, angle = int(rng.integers(1, 9)), rng.choice([0.01, 0.3, 1.0, 3.0])
+        u, normals = rng.normal(size=(2, count, 3))
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        u = normals + rng.choice([0.01, 0.3, 1.0]) * u
+        u /= np.linalg.norm(u, axis=1, keepdims=True)
+        chords, misses = rng.uniform(0.05, 1.0, count), np.linalg.norm(u - normals, axis=1)
+        contacts = (normals, u, chords, chords, chords)
+        kinds = np.full(count, RAY)
+        readings = (normals, chords, chords, kinds, kinds, misses, normals)
+        table, faces = cone_table(count), np.arange(count)
+        assert note_cones(count, faces, u, normals, contacts, readings, table) == count
+        table[2][:] = weights = rng.uniform(0.1, 2.0, count)
+        system, slope = np.zeros((6, 6)), np.zeros(6)
+        room = add_cones(count, table, angle, system, slope)
+        room -= (weights * (1.0 - (misses / chords) ** 2)).sum()
+        form = (system + np.tril(system, -1).T)[:3, :3]
+        for _ in range(10):
+            turn = direction(rng) * angle * rng.choice([1.0, rng.random()])
+            turned = Rotation.from_rotvec(-turn).apply(u) - normals
+            grown = (weights * ((turned**2).sum(axis=1) - misses**2) / chords**2).sum()
+            said = turn @ form @ turn + 2.0 * slope[:3] @ turn - room
+            assert said <= grown + 1e-9 * abs(grown) + 1e-9
+            tightest = min(tightest, (grown - said) / (abs(grown) + 1e-9))
+    assert tightest < 0.01
+
+
+def test_readings_count_by_how_large_a_motion_leaves_them() -> None:
+    rng = np.random.default_rng(10)
+    for _ in range(50):
+        rows, _, numbers = table = places(rng)
+        motion, before = rng.normal(size=6), numbers[2].copy()
+        raise_places(7, table, motion)
+        left = np.abs(numbers[0] - rows @ motion) / numbers[3]
+        np.testing.assert_allclose(numbers[2], before * (np.minimum(left, 10.0) + 0.05))
+        terms, columns, weights, _ = cone_table(7)
+        columns[:], weights[:] = rng.normal(size=(6, 7)), before
+        raise_cones(7, (terms, columns, weights, terms[0]), motion)
+        moved = columns[:3].T + np.cross(columns[3:].T, motion[:3])
+        left = np.linalg.norm(moved, axis=1)
+        np.testing.assert_allclose(weights, before * (np.minimum(left, 10.0) + 0.05))
+
+
+def places(rng: np.random.Generator) -> tuple[Floats, Floats, Floats]:
+    """A table of seven places as `place_table` has it, with levers and directions at random."""
     levers, ways = rng.normal(size=(2, 7, 3))
     ways /= np.linalg.norm(ways, axis=1, keepdims=True)
-    rows = np.column_stack([np.cross(levers, ways), ways, levers, (levers * ways).sum(axis=1)])
-    return rows, rng.uniform(0.1, 1.0, (6, 7))
+    columns = np.column_stack([np.cross(levers, ways), ways, levers, (levers * ways).sum(axis=1)]).T
+    return columns[:6].T.copy(), columns.copy(), rng.uniform(0.1, 1.0, (6, 7))

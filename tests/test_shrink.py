@@ -91,7 +91,7 @@ def _inequalities(arguments: Any, axes: Floats, low: Floats, high: Floats) -> tu
             *((contacts[2][i], contacts[3][i], contacts[4][i]), axes),
             *((low, high, _square(low, high)), used, table, vectors),
         )
-    return table[0][:used], table[1][:used]
+    return table[:6, :used].T, table[6, :used]
 
 
 def test_the_truth_meets_every_inequality_of_a_box_that_holds_it() -> None:
@@ -109,7 +109,8 @@ def test_the_truth_meets_every_inequality_of_a_box_that_holds_it() -> None:
         asked += len(rows)
         if case % 20 == 0:
             ways = rng.normal(size=6)
-            reach = farthest(ways, rows, limits, len(rows), low, low + side, simplex_space())
+            polytope = np.vstack([rows.T, limits]), len(rows), low, low + side
+            reach = farthest(ways, *polytope, simplex_space(len(rows)))
             box = np.column_stack([low, low + side])
             solved = linprog(-ways, A_ub=rows, b_ub=limits, bounds=box)
             assert reach == pytest.approx(-solved.fun, abs=1e-5)
