@@ -20,8 +20,8 @@ from .verdict_kernels import REJECTED, judge
 
 _ONE = np.uint64(1)
 _NONE = np.uint64(0)
-STEPS = 6
-"""Steps of a verdict on one more contact, as on a leaf."""
+STEPS = 3
+"""Steps of a verdict on one more contact."""
 
 
 @borrowing

@@ -8,6 +8,7 @@ from numba import njit
 from .align_kernels import align, middle_translation
 from .compiling import borrowing
 from .fit_kernels import assemble_fit, fit_pose
+from .motion_kernels import move
 from .proof_kernels import locate, workspace
 from .reading_kernels import carry, read, worst_on_pieces
 from .region_kernels import turn_between
@@ -17,25 +18,55 @@ from .verdict_kernels import BESIDE, EXACT, FEASIBLE, REJECTED, judge
 LEAF_STEPS = 2
 """Steps of the first verdict; linear programs and boxes settle what it leaves open, and sooner."""
 FIT_STEPS = 20
+HALVINGS = 7
+"""Of the way from a witness to a best fit that is none."""
+
+
+@borrowing
+def _is_witness(count, faces, contacts, model, rotation, translation, work):
+    """Whether a pose is within all bounds, on concave faces as they are."""
+    readings, x, u = work[0], work[3][0], work[3][1]
+    carry(count, contacts[0], contacts[1], rotation, translation, x, u)
+    if read(count, faces, faces, x, u, model, contacts, readings) > 1.0 + EXACT:
+        return False
+    worst, _ = worst_on_pieces(count, faces, faces, x, model, contacts, readings)
+    return worst <= 1.0 + EXACT
 
 
 @njit(cache=True)
 def finish(count, faces, contacts, model, rotation, translation, work, information):
-    """The best fit near a witness, if that is a witness too; misfit and information of the pose."""
-    points, measured = contacts[0], contacts[1]
-    readings, rows, vectors, frames = work[0], work[3], work[5], work[6]
-    x, u = rows[0], rows[1]
-    fitted, shifted = frames[0], vectors[3]
+    """Move a witness to the best fit, or as far towards it as stays within the bounds, in place.
+
+    Returns:
+        The misfit of that pose, of which the information is written in place.
+    """
+    _, step, trial_shift, shifted = work[5]
+    fitted, trial = work[6]
+    centre, radius = model[5], model[6]
     fitted[:] = rotation
     shifted[:] = translation
     fit_pose(count, faces, contacts, model, FIT_STEPS, fitted, shifted, work)
-    carry(count, points, measured, fitted, shifted, x, u)
-    worst = read(count, faces, faces, x, u, model, contacts, readings)
-    if worst <= 1.0 + EXACT:
-        worst, _ = worst_on_pieces(count, faces, faces, x, model, contacts, readings)
-    if worst <= 1.0 + EXACT:
+    if _is_witness(count, faces, contacts, model, fitted, shifted, work):
         rotation[:] = fitted
         translation[:] = shifted
+    else:
+        # Where a witness was found says nothing; what is nearest to the best fit does.
+        turn_between(rotation, fitted, step)
+        for k in range(3):
+            step[k] *= radius
+            step[3 + k] = 0.0
+            for a in range(3):
+                away = shifted[a] - translation[a]
+                for b in range(3):
+                    away += (fitted[a, b] - rotation[a, b]) * centre[b]
+                step[3 + k] += rotation[a, k] * away
+        for _ in range(HALVINGS):
+            for a in range(6):
+                step[a] *= 0.5
+            move(rotation, translation, step, centre, radius, trial, trial_shift)
+            if _is_witness(count, faces, contacts, model, trial, trial_shift, work):
+                rotation[:] = trial
+                translation[:] = trial_shift
     return weigh(count, faces, contacts, model, rotation, translation, work, information)
 
 

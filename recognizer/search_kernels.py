@@ -40,7 +40,7 @@ FEW = 8
 """Completions of a branch that are tried one by one: looking ahead would cost as many verdicts."""
 PATIENCE = 16
 """Leaves of a model that are tried before it is looked ahead: most models have fewer in all."""
-INNER_STEPS = 2
+INNER_STEPS = 1
 """Steps of a verdict within the tree, where it may stay open."""
 NODES, VERDICTS, INNER_REJECTED, BOXES, CUT, LEAVES_TRIED = 0, 1, 2, 3, 4, 5
 COUNTS = 6

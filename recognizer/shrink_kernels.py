@@ -19,9 +19,9 @@ from .simplex_kernels import farther, farthest, simplex_space
 
 ROOM = 24
 """Inequalities of a contact, on average, that there is room for; what finds none is left out."""
-ROUNDS = 3
+ROUNDS = 6
 """Times that the box is tightened, ..."""
-WORTHWHILE = 0.6
+WORTHWHILE = 0.85
 """... as long as a round leaves less than this share of its volume."""
 
 

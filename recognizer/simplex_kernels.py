@@ -284,7 +284,7 @@ def farther(objective, columns, count, low, high, space):
 
     The box may have been shrunk since, to what holds the polytope. Half as many steps mostly.
     """
-    _, inverse, multipliers, vertex, _, step, slacks, paces, _, known = space
+    _, inverse, multipliers, vertex, shares, step, slacks, paces, _, known = space
     if not known[0]:
         return farthest(objective, columns, count, low, high, space)
     _set_vertex(columns, low, high, space)
@@ -307,6 +307,8 @@ def farther(objective, columns, count, low, high, space):
         if entering < 0:
             break
         _set_shares(entering, columns, space)
+        if abs(shares[leaving]) < STEEP:
+            break  # the matrix is singular to rounding, or about to be
         _exchange(leaving, entering, space)
         _set_vertex(columns, low, high, space)
         _go_along(count, far, paces, slacks)

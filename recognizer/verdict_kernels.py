@@ -18,7 +18,7 @@ from .reading_kernels import ARC, NO_CONE, carry, read, worst_on_pieces
 REJECTED, FEASIBLE, UNDECIDED, BESIDE = 0, 1, 2, 3
 """No pose meets the bounds; the pose found meets them; neither could be shown; the pose found meets
 them on convex hulls, but a contact is beside its concave face."""
-SETTLING = 8
+SETTLING = 3
 """The most moves to the region's own centre; each is a Newton step, so few are ever taken."""
 EXACT = 1e-9
 """By how much a witness may exceed a bound, as a share of it: rounding."""
