@@ -18,7 +18,6 @@ from scipy.spatial.transform import RigidTransform
 from .hypothesis_kernels import group_poses
 from .polyhedron import Polyhedron
 from .pose import Poses
-from .volumes import error_ellipsoids
 
 Floats = NDArray[np.float64]
 
@@ -94,35 +93,29 @@ class Hypothesis:
 
 
 def cluster(
-    model: Polyhedron,
-    poses: Poses,
-    tolerance: PoseTolerance,
-    position_error: float,
-    log_cuts: Floats | None = None,
+    model: Polyhedron, poses: Poses, tolerance: PoseTolerance, position_error: float
 ) -> tuple[list[Hypothesis], Floats]:
     """Group one object's poses into hypotheses.
 
     The weight of a group is the volume of poses it stands for: every pose within the bounds is
     equally likely under noise uniform in them and a uniform prior. An interpretation's volume is
-    approximated locally, by the error ellipsoid of its fit, cut along its axes to what bounds
-    leave of it, times ``exp(-misfit / 2)``: the part of a face within a contact's bound shrinks as
-    the bound is strained, and a normal law of the readings' variances says by how much. Those of a
-    group add up, once a symmetry of the object.
+    approximated locally, by the error ellipsoid of its fit, cut to half a turn and half a diameter
+    along what is open, times ``exp(-misfit / 2)``: what bounds leave shrinks as they are strained,
+    and a normal law of the readings' variances says by how much. Those of a group add up, once a
+    symmetry of the object.
 
     Args:
         model: the object.
         poses: its surviving interpretations.
         tolerance: which poses count as the same.
         position_error: the largest bound on a position, metres.
-        log_cuts: (m,) see `volumes.log_cuts`; without them nothing is cut.
 
     Returns:
         Hypotheses, and (h,) the logarithms of their weights, not yet normalised.
     """
     if not len(poses):
         return [], np.zeros(0)
-    best_first = np.lexsort((poses.costs, ~poses.proven))
-    poses = poses.take(best_first)
+    poses = poses.take(np.lexsort((poses.costs, ~poses.proven)))
     radius = model.diameter / 2.0
     most_shift = tolerance.distance(model.diameter, position_error)
     centres = poses.translations + poses.rotations @ model.centroid
@@ -130,12 +123,13 @@ def cluster(
     # Groups are numbered by their first members, which are their best.
     order = np.argsort(groups, kind="stable")
     starts = np.searchsorted(groups[order], np.arange(groups.max() + 1))
-    variances, motions = error_ellipsoids(poses, radius)
+    prior = np.zeros((6, 6))
+    prior.flat[::7] = [1.0 / (np.pi * radius) ** 2] * 3 + [1.0 / radius**2] * 3
+    precisions, motions = np.linalg.eigh(poses.informations + prior)
+    variances = 1.0 / precisions
     covariances = (motions * variances[:, None]) @ motions.transpose(0, 2, 1)
     log_volumes = 0.5 * np.log(variances).sum(axis=1) + np.log(len(model.symmetries))
     log_shares = log_volumes - 0.5 * poses.costs
-    if log_cuts is not None:
-        log_shares += log_cuts[best_first]
     # Three standard deviations of each motion, against what the tolerance allows it: with bounded
     # noise hardly any fit is off by more.
     allowed = min(tolerance.rotation * radius, most_shift)

@@ -270,7 +270,6 @@ class Recognizer:
                 outliers=outliers,
                 prefixes=_interpretations(before, entry.model.name),
                 surroundings=known,
-                rivals=len(self._solids) > 1,
             )
             _note(found, hypotheses, logs, searches)
         weights = _normalised(np.concatenate(logs) if logs else np.zeros(0))

@@ -29,7 +29,6 @@ from .surroundings import Surroundings, clear
 from .symmetry import feature_permutations
 from .table_cache import cached_tables
 from .tree import Constraints
-from .volumes import log_cuts
 
 if TYPE_CHECKING:
     from .polyhedron import Polyhedron
@@ -136,7 +135,6 @@ def search_solid(
     outliers: int = 0,
     prefixes: NDArray[np.int32] | None = None,
     surroundings: Surroundings | None = None,
-    rivals: bool = False,
 ) -> tuple[list[Hypothesis], NDArray[np.float64], Search]:
     """The search and its groups of poses, for one solid.
 
@@ -149,7 +147,6 @@ def search_solid(
         outliers: how many contacts may lie on no feature.
         prefixes: (m, k) all interpretations of the first k contacts, if known.
         surroundings: what else is known.
-        rivals: whether the weights are compared with those of other solids.
 
     Returns:
         Hypotheses; (h,) the logarithms of their weights, not yet normalised; and what was done.
@@ -157,7 +154,7 @@ def search_solid(
     started = perf_counter()
     surroundings = surroundings or Surroundings.of(None, None)
     settings = (constraints, limits, outliers)
-    copies, symmetric = 1, False
+    copies = 1
     if surroundings.support is not None and surroundings.support.resting:
         poses, nodes, counts = _search_standing(entry, contacts, surroundings, *settings, prefixes)
     else:
@@ -176,17 +173,12 @@ def search_solid(
         poses, nodes, counts = _search(entry, contacts, *settings, start, domains)
         if not surroundings.says_nothing(contacts):
             poses = clear(entry.model, entry.features, poses, contacts, surroundings)
-    cuts = None
-    if len(poses) > 1 or rivals:
-        cuts = log_cuts(entry.test, poses, contacts)
-    if symmetric:
-        permutations = entry.permutations[0]
-        copies = len(permutations)
-        poses, of = _spread_over_symmetries(entry.model, poses, permutations)
-        cuts = None if cuts is None else cuts[of]
+        if symmetric:
+            copies = len(permutations)
+            poses = _spread_over_symmetries(entry.model, poses, permutations)
     searched = perf_counter()
     largest = float(contacts.position_error.max())
-    hypotheses, log_weights = cluster(entry.model, poses, tolerance, largest, cuts)
+    hypotheses, log_weights = cluster(entry.model, poses, tolerance, largest)
     search = Search(
         object_name=entry.model.name,
         nodes=nodes,
@@ -317,10 +309,10 @@ def _finest(contacts: Contacts, radius: float) -> float:
 
 def _spread_over_symmetries(
     model: Polyhedron, poses: Poses, permutations: NDArray[np.int32]
-) -> tuple[Poses, NDArray[np.intp]]:
-    """Each interpretation as seen from every symmetry of the solid, and which one it was."""
+) -> Poses:
+    """Each interpretation as seen from every symmetry of the solid, with its pose."""
     if not len(poses):
-        return poses, np.zeros(0, np.intp)
+        return poses
     count, found = len(permutations), len(poses)
     faces = permutations[:, poses.faces].reshape(count * found, -1)
     faces, rows = np.unique(faces, axis=0, return_index=True)
@@ -332,7 +324,7 @@ def _spread_over_symmetries(
     frames = np.zeros((len(of), 6, 6))
     frames[:, :3, :3] = frames[:, 3:, 3:] = turns
     informations = frames @ poses.informations[of] @ frames.transpose(0, 2, 1)
-    spread = Poses(
+    return Poses(
         np.ascontiguousarray(faces, np.int32),
         rotations,
         centres - rotations @ model.centroid,
@@ -340,7 +332,6 @@ def _spread_over_symmetries(
         informations,
         poses.proven[of],
     )
-    return spread, of
 
 
 def span_solid(

@@ -19,7 +19,8 @@ REJECTED, FEASIBLE, UNDECIDED, BESIDE = 0, 1, 2, 3
 """No pose meets the bounds; the pose found meets them; neither could be shown; the pose found meets
 them on convex hulls, but a contact is beside its concave face."""
 SETTLING = 3
-"""The most moves to the region's own centre; each is a Newton step, so few are ever taken."""
+"""The most moves to the region's own centre, each a Newton step. Most of what is rejected there is
+rejected by then; the rest is left to proofs and boxes sooner."""
 EXACT = 1e-9
 """By how much a witness may exceed a bound, as a share of it: rounding."""
 LONGEST_TURN = 0.3
