@@ -400,7 +400,7 @@ def test_the_region_of_poses_holds_the_truth() -> None:
 
 def test_the_ball_and_the_region_that_a_verdict_leaves_hold_the_truth() -> None:
     rng, seen, shrunk, sample = np.random.default_rng(23), Counter(), 0, None
-    for case in range(1200):
+    for case in range(3600):
         if sample is None or case % 3 == 0:
             sample = draw(rng)
         count, faces, _, model, contacts = sample.question
