@@ -29,8 +29,10 @@ from sensing import (
 from palpate.assets import STAND_IN_NAMES
 from palpate.envs.library import load_library
 from palpate.recognizer import Constraints, Contacts, PairTables, Polyhedron
+from palpate.recognizer.extent_kernels import strain
 from palpate.recognizer.fit_kernels import fit_pose
 from palpate.recognizer.pose import ModelTest, Poses, kernel_contacts
+from palpate.recognizer.pose_kernels import finish, weigh
 from palpate.recognizer.proof_kernels import workspace
 from palpate.recognizer.tree import prune
 
@@ -390,6 +392,29 @@ def test_the_fit_brings_a_pose_back_that_slid_off_its_faces() -> None:
         end = RigidTransform.from_components(translation, Rotation.from_matrix(rotation))
         assert not check(BAR, start, contacts, touches.faces).passed
         assert check(BAR, end, contacts, touches.faces, tolerance=0.05).passed
+
+
+def test_a_witness_ends_nearest_to_the_best_fit_wherever_it_was_found() -> None:
+    rng, before, after = np.random.default_rng(12), [], []
+    for case in range(300):
+        model = list(SMALL.values())[case % len(SMALL)]
+        test = ModelTest(model)
+        touches = touch_faces(model, rng, rng.integers(0, model.face_count, 10).tolist())
+        contacts = feel(touches, rng, 1e-3, 0.2)
+        kernel, faces = kernel_contacts(contacts), touches.faces.astype(np.int64)
+        work, information = workspace(len(contacts)), np.empty((6, 6))
+        (shared,) = test.run(touches.faces[None], contacts).costs
+        rotation = touches.T_world_object.rotation.as_matrix()
+        translation = np.array(touches.T_world_object.translation)
+        # The truth is a witness; the best fit often is none.
+        question = (len(contacts), faces, kernel, test.model, rotation, translation, work)
+        found = weigh(*question, information)
+        cost = finish(*question, information)
+        assert cost <= found * (1.0 + 1e-9)
+        assert strain(faces, kernel, test.model, rotation, translation) <= 1.0 + 1e-8
+        before.append(found - shared)
+        after.append(cost - shared)
+    assert np.mean(np.abs(after)) < 0.5 * np.mean(np.abs(before))
 
 
 def test_two_contacts_farther_apart_than_a_face_is_long_are_not_both_on_it() -> None:
