@@ -10,7 +10,7 @@ from .compiling import borrowing
 from .fit_kernels import assemble_fit, fit_pose
 from .motion_kernels import move
 from .proof_kernels import locate, workspace
-from .reading_kernels import carry, read, worst_on_pieces
+from .reading_kernels import carry, meets_all, read
 from .region_kernels import turn_between
 from .search_pose_kernels import box_stack, search_poses
 from .verdict_kernels import BESIDE, EXACT, FEASIBLE, REJECTED, judge
@@ -25,12 +25,9 @@ HALVINGS = 7
 @borrowing
 def _is_witness(count, faces, contacts, model, rotation, translation, work):
     """Whether a pose is within all bounds, on concave faces as they are."""
-    readings, x, u = work[0], work[3][0], work[3][1]
+    x, u, spare = work[3][0], work[3][1], work[8][2][3]
     carry(count, contacts[0], contacts[1], rotation, translation, x, u)
-    if read(count, faces, faces, x, u, model, contacts, readings) > 1.0 + EXACT:
-        return False
-    worst, _ = worst_on_pieces(count, faces, faces, x, model, contacts, readings)
-    return worst <= 1.0 + EXACT
+    return meets_all(count, faces, x, u, model, contacts, EXACT, spare)
 
 
 @njit(cache=True)
