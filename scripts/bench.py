@@ -54,10 +54,10 @@ def bench(
     """Measure speed, accuracy and growth of the recogniser on one thread; beside it, ICP.
 
     speed: contacts to belief, where the time goes, and the floor of the bit operations. icp: the
-    same contacts given to multi-start ICP. start: the first belief of a fresh process. scale: a
-    large library, and time a model against the number of contacts. large: models of 500 faces.
-    accuracy: pose errors beside the memo's Table V. tables: range tables, once a model. predict:
-    what many poses say of many probes.
+    same contacts given to multi-start ICP. start: fresh processes, to a first belief and of
+    `palpate suggest` with twenty parts. scale: a large library, and time a model against the number
+    of contacts. large: models of 500 faces. accuracy: pose errors beside the memo's Table V.
+    tables: range tables, once a model. predict: what many poses say of many probes.
     """
     keep_to_one_thread()
     # Only now: what these import reads the number of threads once.

@@ -130,7 +130,8 @@ def test_a_library_is_built_once_and_then_read(tmp_path):
 
 def test_the_first_belief_is_of_a_process_of_its_own(monkeypatch):
     monkeypatch.setattr(bench_start, "RUNS", 1)
-    (row,) = bench_start.measure_start(Settings(cases=1)).rows
+    row, parts_row = bench_start.measure_start(Settings(cases=1)).rows
+    assert float(parts_row.here.split()[0]) > 0.0
     whole = float(row.here.split()[0])
     parts = [float(part.split()[-2]) for part in row.details[0].split(";")[0].split(", ")]
     assert len(parts) == 3

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import resource
 import shutil
 import subprocess
 import sys
@@ -15,10 +14,10 @@ import trimesh
 from command import Told, run_here
 from oracles import box, first_hit, model, random_hull, surface_points
 from scipy.spatial.transform import RigidTransform, Rotation
-from test_cli import palpate
 
 from palpate.policies.ranking import FORMULAS
 from palpate.recognizer import Contacts, Polyhedron, Recognizer, diagnose
+from palpate.recognizer.ranges import PairTables
 from palpate.recognizer.twins import same_parts
 
 NAMES = ("l-block", "tetrahedron", "holed")
@@ -317,23 +316,22 @@ def test_a_file_without_normals_is_warned_of(folder, tmp_path):
     assert told.err.count("\n") == 1
 
 
-def test_twenty_parts_take_seconds_from_the_start_of_the_process(folder, tmp_path):
-    """1.5 s of a core's time, imports included; the bar is 3 s, and slow cores have twice that."""
+def test_twenty_parts_are_weighed_and_their_tables_built_once(folder, tmp_path, monkeypatch):
     shutil.copytree(folder / "parts", tmp_path / "parts")
     for seed in range(17):
         hull = random_hull(12, seed)
         hull.apply_scale(SIZE)
         hull.export(tmp_path / "parts" / f"hull-{seed}.stl")
-    path = str(folder / "felt9.csv")
-    spent = []
-    for _ in range(2):  # the first finds no range tables in the cache
-        before = resource.getrusage(resource.RUSAGE_CHILDREN)
-        told = palpate("suggest", path, "--library", "parts", cwd=tmp_path)
-        after = resource.getrusage(resource.RUSAGE_CHILDREN)
-        assert told.returncode == 0, told.stderr
-        assert "9 contacts, 20 parts" in told.stdout
-        spent.append(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime)
-    assert spent[1] < 6.0
+    command = ("suggest", str(folder / "felt9.csv"), "--library", "parts")
+    first = run_here(*command, cwd=tmp_path)
+    assert first.code == 0, first.err
+    assert "9 contacts, 20 parts" in first.out
+
+    def built_again(*_: object) -> None:
+        raise AssertionError("tables are kept on disk")
+
+    monkeypatch.setattr(PairTables, "of", built_again)
+    assert run_here(*command, cwd=tmp_path) == first
 
 
 def test_suggest_loads_no_simulator():
