@@ -125,9 +125,11 @@ $(DEV): pyproject.toml $(CREATED)
 # Compiling the kernels once, here, keeps the wait out of the first episode and the first test.
 # numba looks only at a kernel's own file to see whether its compiled code is stale, not at the
 # kernels it calls: so all are compiled anew when any has changed.
-$(COMPILED): $(wildcard recognizer/*_kernels.py policies/*_kernels.py) $(RUNTIME)
+$(COMPILED): $(wildcard recognizer/*_kernels.py policies/*_kernels.py envs/*_kernels.py) $(RUNTIME)
 	@echo "set-up: compiling the recogniser's kernels (once; three to five minutes)"
-	@rm -f recognizer/__pycache__/*_kernels.*.nb[ci] policies/__pycache__/*_kernels.*.nb[ci]
+	@rm -f recognizer/__pycache__/*_kernels.*.nb[ci] policies/__pycache__/*_kernels.*.nb[ci] \
+	    envs/__pycache__/*_kernels.*.nb[ci]
 	@$(BIN)/python -m palpate.recognizer.warm_up
 	@$(BIN)/python -m palpate.policies.warm_up
+	@$(BIN)/python -m palpate.envs.warm_up
 	@touch $@

@@ -19,7 +19,9 @@ from .predict import predict
 from .probes import ProbeSpace
 from .rays import cast_rays
 from .recognize import Recognizer
+from .repair import repair
 from .support import SupportPlane
+from .surroundings import Surroundings, bounds_of
 from .tree import Constraints, prune
 
 
@@ -37,7 +39,14 @@ def warm_up() -> None:
     predict(sample_belief(belief, [box], 64), ProbeSpace(1.0, 5.0).rays(np.zeros((1, 3))))
     paths = FreeSpace(5.0 * np.eye(3), hits.points_world, error=0.01)
     floor = SupportPlane(height=-1.5, error=0.01, resting=True)
-    recognizer.recognize(contacts, free_space=paths, support=floor)
+    best = recognizer.recognize(contacts, free_space=paths, support=floor).hypotheses[0]
+    bounds = bounds_of(box, recognizer.features("box"), contacts, Surroundings.of(paths, floor))
+    # A little off, so that there is something to repair.
+    aside = best.pose.translation + [0.02, 0.0, 0.0]
+    faces = best.interpretations[0].astype(np.int64)
+    repair(faces, best.pose.rotation.as_matrix(), aside, bounds, steps=1)
+    one = contacts[:1]
+    recognizer.sample_poses(recognizer.recognize(one).hypotheses[0], one, 4)
     prune(recognizer.tables("box"), contacts)
     prune(recognizer.tables("box"), contacts, constraints=Constraints(triple=True, area=True))
     square = Polygon.from_corners([(0.0, 0.0), (1.0, 0.0), (1.0, 2.0), (0.0, 2.0)], name="square")
@@ -48,7 +57,8 @@ def warm_up() -> None:
     around = Contacts(hits.points_world, hits.normals_world, position_error=0.04, normal_error=0.1)
     recognizer.recognize(around)
     flat = Contacts([(0.5, 0.0)], [(0.0, -1.0)], position_error=0.01, normal_error=0.1)
-    Recognizer([square]).recognize(flat)
+    flat_recognizer = Recognizer([square])
+    flat_recognizer.sample_poses(flat_recognizer.recognize(flat).hypotheses[0], flat, 4)
 
 
 if __name__ == "__main__":
