@@ -11,21 +11,16 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from . import extent_kernels, motion_kernels, polytope_kernels
+from . import extent_kernels
 from .contacts import Contacts
 from .hypotheses import Hypothesis, PoseTolerance
 from .pose import ModelTest, kernel_contacts
-from .simplex_kernels import simplex_space
 from .support import StableFace, SupportPlane
 
 Floats = NDArray[np.float64]
 
 ROUNDS = 3
 """Times that the pose is moved to the middle of what is allowed."""
-HALVINGS = 6
-"""Of the way there, if a pose in the middle breaks a bound."""
-WITNESS = 1.0 + 1e-9
-"""What a witness's largest reading may be, in bounds."""
 
 
 def pin_down(
@@ -60,20 +55,40 @@ def pin_down(
     most_shift = tolerance.distance(2.0 * test.radius, float(contacts.position_error.max()))
     allowed = np.array([tolerance.rotation * test.radius, most_shift])
     axes = _axes(hypothesis.covariance)
+    kernel = kernel_contacts(contacts)
     box = np.zeros((6, 2))
     for _ in range(ROUNDS):
-        box, alike = _looked_around(
-            test, hypothesis, contacts, tolerance.rotation, axes, allowed, support, stable
+        box, alike = extent_kernels.look_around(
+            np.ascontiguousarray(hypothesis.interpretations),
+            kernel,
+            contacts.normal_error,
+            test.model,
+            test.features.half_angles,
+            hypothesis.T_world_object,
+            tolerance.rotation,
+            axes,
+            allowed,
+            *_support_rows(test, hypothesis, tolerance.rotation, support, stable),
         )
         if alike:
             return hypothesis
-        if not np.isfinite(box).all():
+        if not (movable and np.isfinite(box).all()):
             break
-        middle = box.mean(axis=1) @ axes
-        moved = _moved(test, hypothesis, contacts, middle) if movable else None
-        if moved is None:
+        middle = box.mean(axis=1)
+        moved, share = extent_kernels.move_within(
+            np.ascontiguousarray(hypothesis.interpretations[0]),
+            kernel,
+            test.model,
+            hypothesis.T_world_object,
+            middle @ axes,
+        )
+        if not share:
             break
-        hypothesis = moved
+        hypothesis = replace(hypothesis, T_world_object=moved)
+        box -= share * middle[:, None]
+        # Wider than twice what is allowed: from wherever, something is beyond it.
+        if (np.ptp(box, axis=1) > 2.0 * np.repeat(allowed, 3)).any():
+            break
     far = np.abs(box).max(axis=1) / np.repeat(allowed, 3)
     return replace(hypothesis, freedoms=axes[far >= min(1.0, far.max())])
 
@@ -84,63 +99,6 @@ def _axes(covariance: Floats) -> Floats:
     for block in (slice(0, 3), slice(3, 6)):
         axes[block, block] = np.linalg.eigh(covariance[block, block])[1].T
     return axes
-
-
-def _looked_around(
-    test: ModelTest,
-    hypothesis: Hypothesis,
-    contacts: Contacts,
-    turn: float,
-    axes: Floats,
-    allowed: Floats,
-    support: SupportPlane | None,
-    stable: list[StableFace] | None,
-) -> tuple[Floats, bool]:
-    """(6, 2) how far poses of all interpretations reach; whether all are as near as is allowed."""
-    kernel = kernel_contacts(contacts)
-    rotation = np.ascontiguousarray(hypothesis.T_world_object[:3, :3])
-    translation = np.ascontiguousarray(hypothesis.T_world_object[:3, 3])
-    x, u = np.empty((2, len(contacts), 3))
-    motion_kernels.to_object(kernel[0], kernel[1], rotation, translation, x, u)
-    corners = int(np.diff(test.features.start).max())
-    extra, extra_limits = _support_rows(test, hypothesis, turn, support, stable)
-    size = len(contacts) * (extent_kernels.ROWS_OF_ONE + corners) + len(extra)
-    rows, limits = np.empty((size, 6)), np.empty(size)
-    columns, space = np.empty((7, size)), simplex_space(size)
-    widest = np.full(6, 4.0 * float(allowed.max()))
-    boxes, alike = [], True
-    for faces in hypothesis.interpretations:
-        count = extent_kernels.contact_rows(
-            faces.astype(np.int64),
-            kernel,
-            contacts.normal_error,
-            test.model,
-            test.features.half_angles,
-            x,
-            u,
-            turn,
-            rows,
-            limits,
-            tuple(np.empty((5, 3))),
-        )
-        rows[count : count + len(extra)], limits[count : count + len(extra)] = extra, extra_limits
-        count = polytope_kernels.take_needed(
-            rows, limits, count + len(extra), -widest, widest, columns
-        )
-        known = (columns, count, -widest, widest, space)
-        box = polytope_kernels.box_of(axes, *known)
-        if not np.isfinite(box).all():
-            continue  # none of its poses is near: those of a symmetry are
-        boxes.append(box)
-        for first, most_allowed in zip((0, 3), allowed, strict=True):
-            part = slice(first, first + 3)
-            alike = alike and polytope_kernels.all_within(
-                first, axes[part, part].copy(), box[part], most_allowed, *known
-            )
-    if not boxes:
-        return np.tile([-np.inf, np.inf], (6, 1)), False
-    least, most_of = np.min(boxes, axis=0)[:, 0], np.max(boxes, axis=0)[:, 1]
-    return np.stack([least, most_of], axis=1), alike
 
 
 def _support_rows(
@@ -178,25 +136,3 @@ def _stands(face: StableFace, pose: Floats, support: SupportPlane) -> bool:
     """Whether all corners of a face are about on the support."""
     heights = (face.corners @ pose[:3, :3].T + pose[:3, 3]) @ support.up - support.height
     return bool((np.abs(heights) <= 2.0 * support.error).all())
-
-
-def _moved(
-    test: ModelTest, hypothesis: Hypothesis, contacts: Contacts, step: Floats
-) -> Hypothesis | None:
-    """The hypothesis moved by a step, or less of it, to a pose within all bounds; None if none."""
-    faces = hypothesis.interpretations[0].astype(np.int64)
-    kernel = kernel_contacts(contacts)
-    pose = hypothesis.T_world_object
-    rotation, translation = pose[:3, :3].copy(), pose[:3, 3].copy()
-    matrix = np.eye(4)
-    share = 1.0
-    for _ in range(HALVINGS):
-        turned, shifted = np.empty((3, 3)), np.empty(3)
-        motion_kernels.move(
-            rotation, translation, share * step, test.model[5], test.radius, turned, shifted
-        )
-        if extent_kernels.strain(faces, kernel, test.model, turned, shifted) <= WITNESS:
-            matrix[:3, :3], matrix[:3, 3] = turned, shifted
-            return replace(hypothesis, T_world_object=matrix)
-        share *= 0.5
-    return None

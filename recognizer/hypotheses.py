@@ -9,13 +9,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
-from .hypothesis_kernels import group_poses
+from .hypothesis_kernels import weigh_poses
 from .polyhedron import Polyhedron
 from .pose import Poses
 
@@ -115,42 +116,34 @@ def cluster(
     """
     if not len(poses):
         return [], np.zeros(0)
-    poses = poses.take(np.lexsort((poses.costs, ~poses.proven)))
     radius = model.diameter / 2.0
     most_shift = tolerance.distance(model.diameter, position_error)
-    centres = poses.translations + poses.rotations @ model.centroid
-    groups = group_poses(poses.rotations, centres, model.symmetries, tolerance.rotation, most_shift)
-    # Groups are numbered by their first members, which are their best.
-    order = np.argsort(groups, kind="stable")
-    starts = np.searchsorted(groups[order], np.arange(groups.max() + 1))
-    prior = np.zeros((6, 6))
-    prior.flat[::7] = [1.0 / (np.pi * radius) ** 2] * 3 + [1.0 / radius**2] * 3
-    precisions, motions = np.linalg.eigh(poses.informations + prior)
-    variances = 1.0 / precisions
-    covariances = (motions * variances[:, None]) @ motions.transpose(0, 2, 1)
-    log_volumes = 0.5 * np.log(variances).sum(axis=1) + np.log(len(model.symmetries))
-    log_shares = log_volumes - 0.5 * poses.costs
-    # Three standard deviations of each motion, against what the tolerance allows it: with bounded
-    # noise hardly any fit is off by more.
-    allowed = min(tolerance.rotation * radius, most_shift)
-    loose = 3.0 * np.sqrt(variances) > allowed
-    matrices = np.zeros((len(starts), 4, 4))
-    leaders = order[starts]
-    matrices[:, :3, :3], matrices[:, :3, 3] = poses.rotations[leaders], poses.translations[leaders]
-    matrices[:, 3, 3] = 1.0
-    hypotheses = [
-        Hypothesis(
-            object_name=model.name,
-            T_world_object=matrix,
-            weight=1.0,
-            interpretations=poses.faces[members],
-            freedoms=_open_motions(members, loose, motions, poses.rotations),
-            covariance=covariances[members[0]].copy(),
-            proven=bool(poses.proven[members[0]]),
+    members, starts, matrices, covariances, log_weights, motions, loose = weigh_poses(
+        (poses.rotations, poses.translations, poses.costs, poses.informations, poses.proven),
+        model.centroid,
+        model.symmetries,
+        radius,
+        tolerance.rotation,
+        most_shift,
+        # Three standard deviations of each motion, against what the tolerance allows it: with
+        # bounded noise hardly any fit is off by more.
+        min(tolerance.rotation * radius, most_shift),
+    )
+    hypotheses = []
+    for group, (start, end) in enumerate(pairwise(starts.tolist())):
+        rows = members[start:end]
+        hypotheses.append(
+            Hypothesis(
+                object_name=model.name,
+                T_world_object=matrices[group],
+                weight=1.0,
+                interpretations=poses.faces[rows],
+                freedoms=_open_motions(rows, loose, motions, poses.rotations),
+                covariance=covariances[group],
+                proven=bool(poses.proven[rows[0]]),
+            )
         )
-        for matrix, members in zip(matrices, np.split(order, starts[1:]), strict=True)
-    ]
-    return hypotheses, np.logaddexp.reduceat(log_shares[order], starts)
+    return hypotheses, log_weights
 
 
 def _open_motions(
@@ -160,14 +153,11 @@ def _open_motions(
 
     Any of them may be the true one, so that a pose is fixed only if each fixes it.
     """
-    first = members[0]
-    for member in members:
-        open_ways = loose[member]
-        if open_ways.any():
-            rows = motions[member].T[open_ways]
-            if member == first:
-                return rows
-            # In the first one's frame: members may be turned by a symmetry of the object.
-            turn = rotations[member].T @ rotations[first]
-            return (rows.reshape(-1, 2, 3) @ turn).reshape(-1, 6)
-    return np.zeros((0, 6))
+    opened = members[loose[members].any(axis=1)]
+    if not len(opened):
+        return np.zeros((0, 6))
+    first, member = members[0], opened[0]
+    motions_member = motions[member].T[loose[member]]
+    # In the first one's frame: members may be turned by a symmetry of the object.
+    turn = np.eye(3) if member == first else rotations[member].T @ rotations[first]
+    return (motions_member.reshape(-1, 2, 3) @ turn).reshape(-1, 6)

@@ -1,4 +1,4 @@
-"""Compiled grouping of poses."""
+"""Compiled grouping and weighing of poses."""
 
 from __future__ import annotations
 
@@ -54,3 +54,81 @@ def group_poses(rotations, centres, symmetries, most_turn, most_shift):
             leaders[found] = m
             found += 1
     return groups
+
+
+@njit(cache=True)
+def weigh_poses(poses, centre, symmetries, radius, most_turn, most_shift, allowed):
+    """Group poses, and weigh each group by the volumes of its poses; see `hypotheses.cluster`.
+
+    Args:
+        poses: (m, 3, 3) rotations and (m, 3) translations, object to world; (m,) misfits; (m, 6, 6)
+            informations; (m,) whether the pose is a witness.
+        centre: (3,) the object's centroid, object frame, metres.
+        symmetries: (g, 3, 3) the object's rotations onto itself.
+        radius: half the object's diameter, metres.
+        most_turn: largest angle within a group, radians.
+        most_shift: largest shift within a group, metres.
+        allowed: what three standard deviations of a motion may be for it to count as fixed, metres.
+
+    Returns:
+        (m,) rows of the poses, group by group, the best of each first; (k + 1,) where each group
+        starts among them; of each group the pose of its best member, (k, 4, 4), and its covariance,
+        (k, 6, 6); (k,) the logarithm of its weight, not yet normalised; of each row of the poses
+        its principal motions, (m, 6, 6), columns, and which of them are open, (m, 6).
+    """
+    rotations, translations, costs, informations, proven = poses
+    count = len(costs)
+    members, starts = _in_groups(
+        rotations, translations, costs, proven, centre, symmetries, most_turn, most_shift
+    )
+    found = len(starts) - 1
+    matrices, covariances = np.zeros((found, 4, 4)), np.zeros((found, 6, 6))
+    log_weights = np.empty(found)
+    motions, loose = np.empty((count, 6, 6)), np.empty((count, 6), np.bool_)
+    shares = np.empty(count)
+    prior = np.zeros((6, 6))
+    for k in range(3):
+        prior[k, k] = 1.0 / (np.pi * radius) ** 2
+        prior[3 + k, 3 + k] = 1.0 / radius**2
+    for g in range(found):
+        for at in range(starts[g], starts[g + 1]):
+            row = members[at]
+            precisions, motions[row] = np.linalg.eigh(informations[row] + prior)
+            shares[at] = np.log(len(symmetries)) - 0.5 * costs[row]
+            for k in range(6):
+                shares[at] -= 0.5 * np.log(precisions[k])
+                loose[row, k] = 3.0 / np.sqrt(precisions[k]) > allowed
+            if at == starts[g]:
+                matrices[g, :3, :3], matrices[g, :3, 3] = rotations[row], translations[row]
+                matrices[g, 3, 3] = 1.0
+                covariances[g] = (motions[row] / precisions) @ motions[row].T
+        of_group = shares[starts[g] : starts[g + 1]]
+        most = of_group.max()
+        log_weights[g] = most + np.log(np.exp(of_group - most).sum())
+    return members, starts, matrices, covariances, log_weights, motions, loose
+
+
+@njit(cache=True)
+def _in_groups(rotations, translations, costs, proven, centre, symmetries, most_turn, most_shift):
+    """Rows of poses group by group, best first, and where each group starts among them."""
+    count = len(costs)
+    # Witnesses first, then by misfit.
+    by_cost = np.argsort(costs, kind="mergesort")
+    ranked = np.concatenate((by_cost[proven[by_cost]], by_cost[~proven[by_cost]]))
+    turns, centres = rotations[ranked], np.empty((count, 3))
+    for at in range(count):
+        for i in range(3):
+            centres[at, i] = translations[ranked[at], i]
+            for j in range(3):
+                centres[at, i] += turns[at, i, j] * centre[j]
+    # Groups are numbered by their first members, which are their best.
+    groups = group_poses(turns, centres, symmetries, most_turn, most_shift)
+    starts = np.zeros(groups.max() + 2, np.int64)
+    for at in range(count):
+        starts[groups[at] + 1] += 1
+    starts = np.cumsum(starts)
+    after, members = starts.copy(), np.empty(count, np.int64)
+    for at in range(count):
+        members[after[groups[at]]] = ranked[at]
+        after[groups[at]] += 1
+    return members, starts

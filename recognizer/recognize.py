@@ -328,7 +328,7 @@ def _interpretations(belief: Belief | None, name: str) -> NDArray[np.int32] | No
 
 
 def _normalised(log_weights: NDArray[np.float64]) -> NDArray[np.float64]:
-    if not len(log_weights):
-        return log_weights
+    if len(log_weights) < 2:
+        return np.ones(len(log_weights))
     weights = np.exp(log_weights - log_weights.max())
     return weights / weights.sum()

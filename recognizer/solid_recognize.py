@@ -6,6 +6,7 @@ search, see `search_kernels`.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -284,13 +285,15 @@ def _search_standing(
 
 def _vague(contacts: Contacts) -> bool:
     """Whether the known normals leave the rotation open: fewer than two, or maybe all parallel."""
-    known = contacts.normal_error < np.pi / 2.0
-    normals, errors = contacts.normals[known], contacts.normal_error[known]
-    if len(normals) < 2:
-        return True
-    # If none surely leans away from the first, two others are about as parallel.
-    parallel = np.cos(np.minimum(errors[0] + errors, np.pi / 2.0)) - ROUNDING
-    return bool((np.abs(normals @ normals[0]) >= parallel).all())
+    rows = zip(contacts.normals, contacts.normal_error.tolist(), strict=True)
+    known = ((normal, error) for normal, error in rows if error < math.pi / 2.0)
+    first, first_error = next(known, (None, 0.0))
+    # If none surely leans away from the first, two others are about as parallel. Contacts come in
+    # an order that has those that lean most first, so mostly the second says it.
+    return first is None or all(
+        abs(first @ normal) >= math.cos(min(first_error + error, math.pi / 2.0)) - ROUNDING
+        for normal, error in known
+    )
 
 
 def _finest(contacts: Contacts, radius: float) -> float:
@@ -302,7 +305,7 @@ def _finest(contacts: Contacts, radius: float) -> float:
         return 0.0
     smallest = float(contacts.position_error.min())
     least, largest = CELL_ANGLES
-    if (contacts.normal_error < np.pi / 2.0).any():
+    if contacts.normal_error.min() < np.pi / 2.0:
         least = LEANING_CELL
     return float(np.clip(FINENESS * smallest / radius, least, largest))
 
