@@ -1,4 +1,4 @@
-"""Compiled lookup of an interpretation among those found: a hash table of their rows."""
+"""Compiled list of the interpretations found, and a hash table of its rows to look them up."""
 
 from __future__ import annotations
 
@@ -50,3 +50,35 @@ def table_of(found_faces, found):
     for row in range(found):
         slots[place_of(found_faces[row], found_faces, slots)] = row
     return slots
+
+
+@njit(cache=True)
+def found_space(most, n):
+    """Room for so many interpretations of n contacts.
+
+    Returns:
+        (m, n) features; (m, 3, 3) rotations and (m, 3) translations; (m,) misfits; (m, 6, 6)
+        informations; (m,) whether the pose is a witness.
+    """
+    return (
+        np.empty((most, n), np.int32),
+        np.empty((most, 3, 3)),
+        np.empty((most, 3)),
+        np.empty(most),
+        np.empty((most, 6, 6)),
+        np.empty(most, np.bool_),
+    )
+
+
+@njit(cache=True)
+def with_room(found):
+    """The same interpretations with room for as many again."""
+    most, n = found[0].shape
+    larger = found_space(2 * most, n)
+    larger[0][:most] = found[0]
+    larger[1][:most] = found[1]
+    larger[2][:most] = found[2]
+    larger[3][:most] = found[3]
+    larger[4][:most] = found[4]
+    larger[5][:most] = found[5]
+    return larger

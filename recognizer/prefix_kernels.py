@@ -33,6 +33,20 @@ def face_cell(contacts, model, facings, angle, allowed, sizes, near):
 
 
 @borrowing
+def known_of(prefixes, known):
+    """Reduce (n, w) bit sets of the first contacts, in place, to what (m, k) prefixes say."""
+    count, start = prefixes.shape
+    for i in range(start):
+        for w in range(known.shape[1]):
+            known[i, w] = _NONE
+    for m in range(count):
+        for i in range(start):
+            f = prefixes[m, i]
+            if f >= 0:
+                known[i, f >> 6] |= _ONE << np.uint64(f & 63)
+
+
+@borrowing
 def begin(prefix, pairs, cell, ways, slabs, allowed, allowed_sizes, faces, left, sizes, room):
     """Assign the first contacts, and narrow what they leave to those after them.
 

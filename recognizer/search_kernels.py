@@ -3,7 +3,7 @@
 Every assignment narrows the features left to later contacts, first by pairs (forward checking on
 bit sets), then, where many completions are left, by the pose that the assigned contacts allow: none
 ends the branch, and where there is one, features of later contacts are ruled out one by one (see
-`look_ahead_kernels`). A leaf gets a verdict that is a pose or a proof.
+`branch_kernels`). A leaf gets a verdict that is a pose or a proof.
 """
 
 from __future__ import annotations
@@ -11,47 +11,39 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from .align_kernels import align, middle_translation
 from .backjump_kernels import back_to, due_branch, note_boxes, note_witness, open_branch
+from .branch_kernels import (
+    BOXES,
+    COUNTS,
+    CUT,
+    LEAVES_TRIED,
+    NODES,
+    branch_poses,
+    branch_space,
+    narrow_rest,
+    next_feature,
+    open_level,
+    pose_branch,
+    pose_space,
+    start_branch,
+)
 from .cell_search_kernels import passing_cells, view_cell
 from .compiling import borrowing
-from .forward_kernels import check_forward, take_lowest
-from .leaf_kernels import place_of, table_of
+from .leaf_kernels import found_space, place_of, table_of, with_room
 from .lean_kernels import lean_space, leans
-from .look_ahead_kernels import drop_beyond_region, drop_rejected, shrink_ball
 from .mask_kernels import pair_readings
-from .pose_kernels import finish, settle, start_pose
-from .prefix_kernels import begin, face_cell
-from .proof_kernels import locate, workspace
-from .room_kernels import DIRECTIONS, enter, feature_slabs, view_ways
-from .search_pose_kernels import box_stack
-from .verdict_kernels import FEASIBLE, REJECTED, judge
+from .pose_kernels import finish, settle
+from .prefix_kernels import begin, face_cell, known_of
+from .room_kernels import DIRECTIONS, feature_slabs, view_ways
+from .verdict_kernels import FEASIBLE, REJECTED
 
-_ONE = np.uint64(1)
-_NONE = np.uint64(0)
 VAGUE = 1.2
 """An angle (radians) of rotations too wide for a verdict within the tree to be worth its time."""
-NARROW = 0.2
-"""An angle (radians) of rotations so narrow that normals alone rule out no more."""
+FEWEST = 3
+"""Contacts of the shortest branch that is asked for a pose: two leave nearly all rotations open."""
 SPARING, SCARCE = 100, 2.0 / 3.0
 """Boxes for a leaf once less than so much of the pool is left: most that are rejected at all take
 fewer, and a few that take many do not leave thousands undecided."""
-FEW = 8
-"""Completions of a branch that are tried one by one: looking ahead would cost as many verdicts."""
-PATIENCE = 16
-"""Leaves of a model that are tried before it is looked ahead: most models have fewer in all."""
-INNER_STEPS = 1
-"""Steps of a verdict within the tree, where it may stay open."""
-NODES, VERDICTS, INNER_REJECTED, BOXES, CUT, LEAVES_TRIED = 0, 1, 2, 3, 4, 5
-COUNTS = 6
-"""Places of the counts that a search returns."""
-
-
-@njit(cache=True)
-def _larger(array, size):
-    grown = np.empty((size,) + array.shape[1:], array.dtype)
-    grown[: len(array)] = array
-    return grown
 
 
 @borrowing
@@ -60,16 +52,62 @@ def share_of(most_boxes, pool, whole):
     return min(most_boxes if pool >= SCARCE * whole else SPARING, most_boxes, pool)
 
 
-@borrowing
-def count_ways(depth, sizes):
-    """How many later contacts have no feature left, and how many ways the others have together."""
-    empty = 0
-    completions = 1.0
-    for j in range(depth, len(sizes)):
-        if sizes[j] == 0:
-            empty += 1
-        completions *= max(sizes[j], 1)
-    return empty, completions
+@njit(cache=True)
+def try_leaf(
+    start, n, faces, problem, cell, angle, most, pool, effort, rotation, translation, spare, space
+):
+    """The verdict on a leaf, and the shortest branch that is rejected with it.
+
+    Args:
+        start: contacts of the shortest branch that may be.
+        n: contacts of the leaf.
+        faces: (n,) their features, -1 for none.
+        problem: see `branch_kernels.start_branch`.
+        cell: likewise.
+        angle: an angle that no rotation within the bounds is farther from the given one, radians.
+        most: the most boxes of rotations to look at for the leaf.
+        pool: the same for the branches as well.
+        effort: see `backjump_kernels.back_to`.
+        rotation: (3, 3) object to world, moved in place: a witness, or the least bad pose met.
+        translation: (3,) likewise.
+        spare: (3, 3) and (3,) work space.
+        space: see `branch_kernels.pose_space`.
+
+    Returns:
+        REJECTED, FEASIBLE or UNDECIDED; how many contacts the rejected branch has, n if it is the
+        leaf alone or none; how many boxes were looked at.
+    """
+    contacts, model, half_angles, middles = problem
+    work, stack, _, _, _ = space
+    spent, due = effort
+    ball = work[6][1]
+    ball[:] = rotation
+    verdict, looked = settle(
+        n, faces, contacts, model, ball, angle, most, rotation, translation, work, stack
+    )
+    if verdict == FEASIBLE:
+        note_witness(n, due)
+        return verdict, n, looked
+    note_boxes(n, looked, spent)
+    if due_branch(start, n, spent, due) < 0:
+        return verdict, n, looked
+    branch, more = back_to(
+        start,
+        n,
+        faces,
+        contacts,
+        model,
+        half_angles,
+        middles,
+        cell,
+        pool - looked,
+        effort,
+        spare[0],
+        spare[1],
+        work,
+        stack,
+    )
+    return verdict, branch, looked + more
 
 
 @njit(cache=True)
@@ -122,64 +160,37 @@ def search_model(
     Returns:
         (m, n) interpretations; (m, 3, 3) rotations, (m, 3) translations, (m,) least-squares
         misfits, (m, 6, 6) informations about small motions (see `motion_kernels`), (m,) whether
-        the pose is a witness; (n,) branches at each level; counts (see `NODES`).
+        the pose is a witness; (n,) branches at each level; counts (see
+        `branch_kernels.NODES`).
     """
     points = contacts[0]
-    n, features, words = len(points), packed.shape[2], domains.shape[1]
-    start = prefixes.shape[1]
+    n, words, start = len(points), domains.shape[1], prefixes.shape[1]
     readings = np.empty((n, n, 9))
     pair_readings(contacts, errors, readings)
-    left = np.zeros((n + 1, n, words), np.uint64)
-    sizes = np.full((n + 1, n), features)
-    untried = np.zeros((n, words), np.uint64)
-    null_left = np.zeros(n, np.bool_)
-    faces = np.full(n, -1, np.int64)
-    nulls = np.zeros(n + 1, np.int64)
-    posed = np.full(n + 1, -1, np.int64)
-    turns = np.empty((n + 1, 3, 3))
-    shifts = np.empty((n + 1, 3))
-    angles = np.empty(n + 1)
-    rotation, translation = np.empty((3, 3)), np.empty(3)
-    # A leaf in a cell mostly takes more than a sparing share, so that would be wasted on it.
-    whole = 0 if finest > 0.0 else pool
-    work = workspace(n)
-    stack = box_stack(n)
-    row, near, root = np.empty(6), np.empty(3), np.empty((3, 3))
-    spent, due = np.zeros(n + 1), np.zeros(n + 1)
-    found_before = np.zeros(n + 1, np.int64)
-    aligned, branch_turn, branch_shift = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
-    held = (np.empty(n, np.int64), np.empty((3, 3)), np.empty((3, 3)), np.empty(3))
-    ball = work[6][1]
-    tight = (np.empty((3, 3)), np.empty(3), np.empty(3), np.empty(6), np.empty((3, 3)), np.empty(3))
-    nodes = np.zeros(n, np.int64)
-    counts = np.zeros(COUNTS, np.int64)
-    found = 0
-    found_faces = np.empty((16, n), np.int32)
-    found_turns = np.empty((16, 3, 3))
-    found_shifts = np.empty((16, 3))
-    found_costs = np.empty(16)
-    found_informations = np.empty((16, 6, 6))
-    found_proven = np.empty(16, np.bool_)
-    place, slots = 0, table_of(found_faces, 0)
-    between = np.empty((n, n, 3))
-    facings = np.empty((n, 3))
     pairs = (packed, half_angles, errors, switches, model[0], readings)
+    problem = (contacts, model, half_angles, middles)
+    branches, poses = branch_space(n, words, packed.shape[2]), branch_poses(n)
+    left, sizes, nulls, rooms, posed = branches[0], branches[1], branches[4], branches[5], poses[0]
+    faces = np.full(n, -1, np.int64)
+    rotation, translation = np.empty((3, 3)), np.empty(3)
+    space, lean_work = pose_space(n), lean_space(n)
+    work, near = space[0], space[2][1]
+    beside = (np.empty((3, 3)), np.empty(3))
+    effort = (np.zeros(n + 1), np.zeros(n + 1))
+    spent, due = effort
+    nodes, counts = np.zeros(n, np.int64), np.zeros(COUNTS, np.int64)
+    found, kept, found_before = 0, found_space(16, n), np.zeros(n + 1, np.int64)
+    place, slots = 0, table_of(kept[0], 0)
     in_cell = finest > 0.0
+    # A leaf in a cell mostly takes more than a sparing share, so that would be wasted on it.
+    whole = 0 if in_cell else pool
+    between, facings = np.empty((n, n, 3)), np.empty((n, 3))
     known, allowed = domains.copy(), domains.copy()
-    allowed_sizes = np.full(n, features)
-    slabs = feature_slabs(model)
-    lean_work = lean_space(n)
-    rooms = np.empty((n + 1, len(DIRECTIONS), 2))
-    ways = np.empty((n, len(DIRECTIONS), 2))
-    cells, cell_angles, firsts = np.empty((1, 3, 3)), np.zeros(1), domains[:1].copy()
+    allowed_sizes = np.full(n, packed.shape[2])
+    slabs, ways = feature_slabs(model), np.empty((n, len(DIRECTIONS), 2))
+    cells, cell_angles, firsts = np.empty((1, 3, 3)), np.full(1, -1.0), domains[:1].copy()
     if in_cell:
-        # What is known of the first contacts says where to look.
-        known[:start] = _NONE
-        for m in range(len(prefixes)):
-            for i in range(start):
-                f = prefixes[m, i]
-                if f >= 0:
-                    known[i, f >> 6] |= _ONE << np.uint64(f & 63)
+        known_of(prefixes, known)
         cells, cell_angles, firsts = passing_cells(
             contacts,
             errors,
@@ -195,19 +206,18 @@ def search_model(
             most_cells,
         )
     for turn in range(len(cells)):
-        cell_angle = -1.0
+        cell, seen = (cells[turn], cell_angles[turn]), (between, cell_angles[turn])
         if in_cell:
-            cell_angle = cell_angles[turn]
             view_cell(cells[turn], points, contacts[1], between, facings)
-            view_ways(points, contacts[2], cells[turn], cell_angle, ways)
+            view_ways(points, contacts[2], cells[turn], cell_angles[turn], ways)
             allowed[:] = known
             allowed[0] = firsts[turn]
-            face_cell(contacts, model, facings, cell_angle, allowed, allowed_sizes, near)
+            face_cell(contacts, model, facings, cell_angles[turn], allowed, allowed_sizes, near)
         for m in range(len(prefixes)):
             nulls[start] = begin(
                 prefixes[m],
                 pairs,
-                (between, cell_angle),
+                seen,
                 ways,
                 slabs,
                 allowed,
@@ -220,268 +230,115 @@ def search_model(
             if nulls[start] < 0:
                 continue
             posed[start] = -1
-            level = start
             for k in range(start + 1):
                 open_branch(k, spent, due)
                 found_before[k] = found
-            untried[level] = left[level, level]
-            null_left[level] = nulls[level] < spare
+            level = start
+            open_level(level, spare, branches)
             while level >= start:
-                # The next feature of this contact, or none at all.
-                face = take_lowest(untried[level])
-                if face < 0:
-                    if not null_left[level]:
-                        level -= 1
-                        continue
-                    null_left[level] = False
-                faces[level] = face
-                depth = level + 1
-                nulls[depth] = nulls[level] + (1 if face < 0 else 0)
+                if not next_feature(level, faces, branches):
+                    level -= 1
+                    continue
                 if counts[NODES] == most_nodes or found == most_leaves:
                     counts[CUT] = 1
-                    level = -1
                     break
                 counts[NODES] += 1
                 nodes[level] += 1
+                depth = level + 1
                 open_branch(depth, spent, due)
                 found_before[depth] = found
-                if face < 0:
-                    rooms[depth] = rooms[level]
-                elif in_cell and not enter(ways[level], slabs[face], rooms[level], rooms[depth]):
-                    continue
-                empty, completions = check_forward(
-                    level,
-                    face,
-                    depth,
-                    spare - nulls[depth],
-                    pairs,
-                    (between, cell_angle),
-                    left[level],
-                    sizes[level],
-                    left[depth],
-                    sizes[depth],
-                )
-                if nulls[depth] + empty > spare:
+                completions = narrow_rest(level, faces, spare, pairs, seen, ways, slabs, branches)
+                if completions < 0.0:
                     continue
                 posed[depth] = posed[level]
-                last = posed[depth]
                 leaf = depth == n
-                if not leaf and (depth < 3 or completions <= crowd):
+                if not leaf and (depth < FEWEST or completions <= crowd):
                     level = depth
-                    untried[level] = left[level, level]
-                    null_left[level] = nulls[level] < spare
+                    open_level(level, spare, branches)
                     continue
-                # Where the pose can be: about that of a shorter branch, or as the normals have it.
-                if last >= 0:
-                    rotation[:], translation[:] = turns[last], shifts[last]
-                    angle = angles[last]
-                    # All normals together may say more than the shorter branch's poses.
-                    if (
-                        angle > NARROW
-                        and not in_cell
-                        and align(depth, faces, model, half_angles, contacts, aligned) < 0.0
-                    ):
-                        continue
-                elif in_cell:
-                    rotation[:] = cells[turn]
-                    middle_translation(depth, faces, points, middles, rotation, translation)
-                    angle = cell_angle
-                else:
-                    angle = start_pose(
-                        depth, faces, contacts, model, half_angles, middles, rotation, translation
-                    )
-                    if angle < 0.0:
-                        continue
+                angle = start_branch(
+                    depth, faces, problem, cell, poses, rotation, translation, beside[0]
+                )
+                if angle < 0.0:
+                    continue
                 if not leaf:
-                    if angle > VAGUE:
-                        level = depth
-                        untried[level] = left[level, level]
-                        null_left[level] = nulls[level] < spare
-                        continue
-                    counts[VERDICTS] += 1
-                    ball[:] = rotation
-                    verdict, angle, _, _ = judge(
+                    if angle > VAGUE or pose_branch(
                         depth,
                         faces,
-                        faces,
-                        contacts,
-                        model,
-                        ball,
+                        spare,
+                        problem,
                         angle,
-                        INNER_STEPS,
-                        False,
+                        branches,
+                        poses,
                         rotation,
                         translation,
-                        work,
-                    )
-                    if verdict != REJECTED:
-                        angle, _ = locate(
-                            depth, faces, faces, model, contacts, rotation, ball, angle, work
-                        )
-                    if verdict == REJECTED or angle < 0.0:
-                        counts[INNER_REJECTED] += 1
-                        note_boxes(depth, 0, spent)
-                        continue
-                    posed[depth] = depth
-                    turns[depth], shifts[depth], angles[depth] = rotation, translation, angle
-                    drop_beyond_region(
-                        depth,
-                        contacts,
-                        model,
-                        rotation,
-                        translation,
-                        angle,
-                        left[depth],
-                        sizes[depth],
-                        work,
-                        (row, near, root),
-                    )
-                    empty, completions = count_ways(depth, sizes[depth])
-                    if (
-                        nulls[depth] + empty <= spare
-                        and completions > FEW
-                        and counts[LEAVES_TRIED] >= PATIENCE
+                        counts,
+                        spent,
+                        space,
                     ):
-                        # The tighter the ball, the more of these verdicts are rejections.
-                        angle = shrink_ball(
-                            depth,
-                            faces,
-                            model,
-                            contacts,
-                            angle,
-                            turns[depth],
-                            shifts[depth],
-                            work,
-                            stack,
-                            tight,
-                        )
-                        if angle < 0.0:
-                            counts[INNER_REJECTED] += 1
-                            note_boxes(depth, 0, spent)
-                            continue
-                        angles[depth] = angle
-                        counts[VERDICTS] += drop_rejected(
-                            depth,
-                            faces,
-                            nulls[depth] == spare,
-                            contacts,
-                            model,
-                            turns[depth],
-                            shifts[depth],
-                            angle,
-                            left[depth],
-                            sizes[depth],
-                            work,
-                            held,
-                        )
-                        empty, _ = count_ways(depth, sizes[depth])
-                    if nulls[depth] + empty > spare:
-                        counts[INNER_REJECTED] += 1
-                        continue
-                    level = depth
-                    untried[level] = left[level, level]
-                    null_left[level] = nulls[level] < spare
+                        level = depth
+                        open_level(level, spare, branches)
+                    continue
+                if not leans(n, faces, contacts, errors, model, half_angles, *cell, lean_work):
                     continue
                 # A pose may be in several cells.
                 same = found
-                if not leans(
-                    n,
-                    faces,
-                    contacts,
-                    errors,
-                    model,
-                    half_angles,
-                    cells[turn],
-                    cell_angle,
-                    lean_work,
-                ):
-                    continue
                 if in_cell:
-                    place = place_of(faces, found_faces, slots)
+                    place = place_of(faces, kept[0], slots)
                     if slots[place] >= 0:
                         same = slots[place]
-                        if found_proven[same]:
+                        if kept[5][same]:
                             continue
                 counts[LEAVES_TRIED] += 1
-                ball[:] = rotation
-                verdict, looked = settle(
+                verdict, branch, looked = try_leaf(
+                    start,
                     n,
                     faces,
-                    contacts,
-                    model,
-                    ball,
+                    problem,
+                    cell,
                     angle,
                     share_of(most_boxes, pool, whole),
+                    pool,
+                    effort,
                     rotation,
                     translation,
-                    work,
-                    stack,
+                    beside,
+                    space,
                 )
                 pool -= looked
                 counts[BOXES] += looked
-                if verdict == FEASIBLE:
-                    note_witness(n, due)
-                else:
-                    note_boxes(n, looked, spent)
-                    branch = n
-                    if due_branch(start, n, spent, due) >= 0:
-                        branch, looked = back_to(
-                            start,
-                            n,
-                            faces,
-                            contacts,
-                            model,
-                            half_angles,
-                            middles,
-                            (cells[turn], cell_angle),
-                            pool,
-                            (spent, due),
-                            branch_turn,
-                            branch_shift,
-                            work,
-                            stack,
-                        )
-                        pool -= looked
-                        counts[BOXES] += looked
-                    if branch < n:
-                        level = branch - 1
-                        if not in_cell:
-                            # What stayed undecided there is rejected with it.
-                            found = found_before[branch]
-                        continue
+                if branch < n:
+                    level = branch - 1
+                    if not in_cell:
+                        # What stayed undecided there is rejected with it.
+                        found = found_before[branch]
+                    continue
                 if verdict == REJECTED or (same < found and verdict != FEASIBLE):
                     continue
-                if found == len(found_costs):
-                    found_faces = _larger(found_faces, 2 * found)
-                    found_turns = _larger(found_turns, 2 * found)
-                    found_shifts = _larger(found_shifts, 2 * found)
-                    found_costs = _larger(found_costs, 2 * found)
-                    found_informations = _larger(found_informations, 2 * found)
-                    found_proven = _larger(found_proven, 2 * found)
+                if found == len(kept[0]):
+                    kept = with_room(kept)
                     if in_cell:
-                        slots = table_of(found_faces, found)
-                        place = place_of(faces, found_faces, slots)
+                        slots = table_of(kept[0], found)
+                        place = place_of(faces, kept[0], slots)
                 if in_cell:
                     slots[place] = same
-                found_costs[same] = finish(
-                    n, faces, contacts, model, rotation, translation, work, found_informations[same]
+                kept[3][same] = finish(
+                    n, faces, contacts, model, rotation, translation, work, kept[4][same]
                 )
-                found_faces[same] = faces
-                found_turns[same] = rotation
-                found_shifts[same] = translation
-                found_proven[same] = verdict == FEASIBLE
+                kept[0][same], kept[1][same], kept[2][same] = faces, rotation, translation
+                kept[5][same] = verdict == FEASIBLE
                 found += same == found
             if counts[CUT]:
                 break
         if counts[CUT]:
             break
     return (
-        found_faces[:found],
-        found_turns[:found],
-        found_shifts[:found],
-        found_costs[:found],
-        found_informations[:found],
-        found_proven[:found],
+        kept[0][:found],
+        kept[1][:found],
+        kept[2][:found],
+        kept[3][:found],
+        kept[4][:found],
+        kept[5][:found],
         nodes,
         counts,
     )

@@ -14,7 +14,8 @@ from numba import njit
 from .compiling import borrowing
 from .feasibility_kernels import seek_feasible
 from .motion_kernels import copy_pose, copy_rotation, move
-from .proof_kernels import locate, set_levers
+from .multiplier_kernels import set_levers
+from .proof_kernels import locate
 from .reading_kernels import carry, read, worst_on_pieces
 from .shrink_kernels import box_region, shrink_box, shrink_space
 from .turn_kernels import note_turns, open_turns, turn_space

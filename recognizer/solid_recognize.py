@@ -20,6 +20,7 @@ from scipy.spatial.transform import RigidTransform
 
 from . import search_kernels
 from .belief import Search
+from .branch_kernels import BOXES, COUNTS, CUT, LEAVES_TRIED
 from .contacts import Contacts
 from .features import Features, all_features, face_features, with_squares
 from .hypotheses import Hypothesis, PoseTolerance, cluster
@@ -183,11 +184,11 @@ def search_solid(
     search = Search(
         object_name=entry.model.name,
         nodes=nodes,
-        pruned=int(counts[search_kernels.LEAVES_TRIED]) * copies,
+        pruned=int(counts[LEAVES_TRIED]) * copies,
         tested=len(poses),
         hypotheses=len(hypotheses),
-        complete=not counts[search_kernels.CUT],
-        boxes=int(counts[search_kernels.BOXES]),
+        complete=not counts[CUT],
+        boxes=int(counts[BOXES]),
         search_seconds=searched - started,
         cluster_seconds=perf_counter() - searched,
     )
@@ -251,7 +252,7 @@ def _search_standing(
     domains[1:, : own.shape[1]] = own
     parts: list[Poses] = []
     nodes = np.zeros(len(contacts), np.int64)
-    counts = np.zeros(search_kernels.COUNTS, np.int64)
+    counts = np.zeros(COUNTS, np.int64)
     # One that stands on either of two faces is there twice.
     start = np.zeros((1, 0), np.int32) if prefixes is None else np.unique(prefixes, axis=0)
     plain: Poses | None = None

@@ -21,6 +21,7 @@ from sensing import CUBE, HOLED, L_BLOCK, Touches, feel, forget_normals, touch_f
 
 from palpate.recognizer import Contacts, PairTables
 from palpate.recognizer.align_kernels import middle_translation
+from palpate.recognizer.branch_kernels import INNER_STEPS
 from palpate.recognizer.cone_kernels import add_cones, cone_table, note_cones, raise_cones
 from palpate.recognizer.features import all_features
 from palpate.recognizer.forward_kernels import check_forward, take_lowest
@@ -33,7 +34,7 @@ from palpate.recognizer.proof_kernels import locate, workspace
 from palpate.recognizer.ranges import pack_tables
 from palpate.recognizer.reading_kernels import RAY
 from palpate.recognizer.region_kernels import remainder
-from palpate.recognizer.search_kernels import INNER_STEPS, VAGUE
+from palpate.recognizer.search_kernels import VAGUE
 from palpate.recognizer.tree import Constraints
 from palpate.recognizer.verdict_kernels import REJECTED, judge
 
