@@ -10,7 +10,7 @@ import numpy as np
 from numba import njit
 
 from .compiling import borrowing
-from .simplex_kernels import farther, farthest
+from .simplex_kernels import farther, forget_vertex
 
 CUTS = 24
 """Planes that are cut off the shadow of a polytope; one that takes more counts as too long."""
@@ -59,13 +59,13 @@ def box_of(axes, columns, count, low, high, space):
     """
     objective = np.empty(6)
     found = np.empty((len(axes), 2))
+    forget_vertex(space)
     for a in range(len(axes)):
         for side in range(2):
             sign = 2.0 * side - 1.0
             for k in range(6):
                 objective[k] = sign * axes[a, k]
-            program = (objective, columns, count, low, high, space)
-            found[a, side] = sign * (farthest(*program) if a + side == 0 else farther(*program))
+            found[a, side] = sign * farther(objective, columns, count, low, high, space)
     return found
 
 

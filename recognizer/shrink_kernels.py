@@ -15,7 +15,7 @@ from numba import njit
 from .align_kernels import diagonalise
 from .compiling import borrowing
 from .inequality_kernels import ROUNDING, add_contact
-from .simplex_kernels import farther, farthest, simplex_space
+from .simplex_kernels import farther, forget_vertex, simplex_space
 
 ROOM = 24
 """Inequalities of a contact, on average, that there is room for; what finds none is left out."""
@@ -120,13 +120,13 @@ def shrink_box(
         if used == 0:
             break
         shrunk = 1.0
+        forget_vertex(programs)
         for k in range(3):
             before = high[k] - low[k]
             for side in range(2):
                 sign = 2.0 * side - 1.0
                 objective[k] = sign
-                program = (objective, table, used, low, high, programs)
-                most = (farthest(*program) if k + side == 0 else farther(*program)) + ROUNDING
+                most = farther(objective, table, used, low, high, programs) + ROUNDING
                 if side == 1:
                     high[k] = min(high[k], most)
                 else:

@@ -279,6 +279,12 @@ def farthest(objective, columns, count, low, high, space):
 
 
 @borrowing
+def forget_vertex(space):
+    """Let the next program start anew: it is about another polytope."""
+    space[9][0] = False
+
+
+@borrowing
 def farther(objective, columns, count, low, high, space):
     """`farthest`, from the vertex that the last program about the same polytope ended at.
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command import run_here
 from scipy.spatial.transform import RigidTransform
 
 from palpate.assets import mesh_path
@@ -45,11 +46,11 @@ def test_an_episode_as_json_holds_the_truth_among_its_hypotheses(tmp_path):
 
 
 def test_an_episode_tells_its_story_and_draws_it(tmp_path):
-    told = palpate("episode", "--object", "simple-hand", "--picture", "end.png", cwd=tmp_path)
-    assert told.returncode == 0, told.stderr
-    assert "probe  1" in told.stdout
-    assert "It is simple-hand." in told.stdout
-    assert "error" in told.stdout
+    told = run_here("episode", "--object", "simple-hand", "--picture", "end.png", cwd=tmp_path)
+    assert told.code == 0, told.err
+    assert "probe  1" in told.out
+    assert "It is simple-hand." in told.out
+    assert "error" in told.out
     assert (tmp_path / "end.png").stat().st_size > 10_000
     assert [path.name for path in tmp_path.iterdir()] == ["end.png"]
 
@@ -79,9 +80,9 @@ def test_how_far_a_mesh_and_what_is_touched_of_it_differ_is_told_where_it_matter
     corner.apply_transform(turned)
     corner.export(library / "corner.stl")
     options = ("--library", "library", "--sensor", sensor, "--max-probes", "1", "--no-picture")
-    told = palpate("episode", *options, "--seed", "0", cwd=tmp_path)
-    assert told.returncode == 0, told.stderr
-    lines = [line for line in told.stdout.splitlines() if "from its mesh by up to" in line]
+    told = run_here("episode", *options, "--seed", "0", cwd=tmp_path)
+    assert told.code == 0, told.err
+    lines = [line for line in told.out.splitlines() if "from its mesh by up to" in line]
     if sensor == "ray":
         assert not lines
     else:
@@ -107,17 +108,17 @@ def extruded(outline, height):
 
 def test_a_ball_finds_an_object_that_stands_on_the_plane(tmp_path):
     options = ("--object", "simple-hand", "--sensor", "ball", "--placement", "resting")
-    told = palpate("episode", *options, "--no-picture", cwd=tmp_path)
-    assert told.returncode == 0, told.stderr
-    assert "stands on a plane" in told.stdout
-    assert "It is simple-hand." in told.stdout
+    told = run_here("episode", *options, "--no-picture", cwd=tmp_path)
+    assert told.code == 0, told.err
+    assert "stands on a plane" in told.out
+    assert "It is simple-hand." in told.out
 
 
 def test_the_many_rays_of_a_scanner_are_counted(tmp_path):
     options = ("--object", "simple-hand", "--sensor", "range", "--max-probes", "1")
-    told = palpate("episode", *options, "--no-picture", cwd=tmp_path)
-    assert told.returncode == 0, told.stderr
-    assert "12 object, 24 plane" in told.stdout
+    told = run_here("episode", *options, "--no-picture", cwd=tmp_path)
+    assert told.code == 0, told.err
+    assert "12 object, 24 plane" in told.out
 
 
 @pytest.mark.parametrize(
@@ -125,17 +126,17 @@ def test_the_many_rays_of_a_scanner_are_counted(tmp_path):
     [("--sensor", "foot", "ray, ball, finger"), ("--placement", "flying", "'resting'")],
 )
 def test_a_sensor_or_a_placement_that_there_is_not_is_one_line(tmp_path, option, value, says):
-    told = palpate("episode", option, value, "--no-picture", cwd=tmp_path)
-    assert told.returncode == 2
-    assert says in told.stderr
-    assert value in told.stderr
-    assert len(told.stderr.splitlines()) == 1
+    told = run_here("episode", option, value, "--no-picture", cwd=tmp_path)
+    assert told.code == 2
+    assert says in told.err
+    assert value in told.err
+    assert len(told.err.splitlines()) == 1
 
 
 def test_the_same_seed_prints_the_same_story(tmp_path):
-    once, again = (palpate("episode", "--no-picture", cwd=tmp_path).stdout for _ in range(2))
+    once, again = (run_here("episode", "--no-picture", cwd=tmp_path).out for _ in range(2))
     assert once == again
-    assert once != palpate("episode", "--no-picture", "--seed", "5", cwd=tmp_path).stdout
+    assert once != run_here("episode", "--no-picture", "--seed", "5", cwd=tmp_path).out
 
 
 def test_an_object_that_is_never_touched_is_no_mistake(tmp_path):
@@ -145,13 +146,13 @@ def test_an_object_that_is_never_touched_is_no_mistake(tmp_path):
     library.mkdir()
     trimesh.creation.box((0.002, 0.002, 0.002)).export(library / "grain.stl")
     trimesh.creation.box((0.5, 0.5, 0.5)).export(library / "crate.stl")
-    told = palpate(
+    told = run_here(
         *("episode", "--library", "library", "--object", "grain", "--no-picture"),
         *("--position-error", "1e-4", "--max-probes", "2"),
         cwd=tmp_path,
     )
-    assert told.returncode == 0, told.stderr
-    assert "No probe touched the object" in told.stdout
+    assert told.code == 0, told.err
+    assert "No probe touched the object" in told.out
 
 
 @pytest.mark.parametrize(
@@ -184,11 +185,11 @@ def test_bad_input_is_one_line_and_exit_code_2(tmp_path, arguments, words):
     (tmp_path / "broken" / "thing.stl").write_bytes(b"solid nonsense, cut")
     box = trimesh.creation.box()
     trimesh.Trimesh(box.vertices, box.faces[1:], process=False).export(tmp_path / "open/lid.obj")
-    told = palpate(*arguments, cwd=tmp_path)
-    assert told.returncode == 2, told.stderr
-    assert len(told.stderr.strip().splitlines()) == 1
+    told = run_here(*arguments, cwd=tmp_path)
+    assert told.code == 2, told.err
+    assert len(told.err.strip().splitlines()) == 1
     for word in words:
-        assert word in told.stderr
+        assert word in told.err
 
 
 def test_an_inverted_mesh_is_mended_and_said(tmp_path):
@@ -198,20 +199,20 @@ def test_an_inverted_mesh_is_mended_and_said(tmp_path):
     (tmp_path / "library").mkdir()
     inverted = trimesh.Trimesh(box.vertices, box.faces[:, ::-1], process=False)
     inverted.export(tmp_path / "library" / "block.obj")
-    told = palpate(
+    told = run_here(
         *("episode", "--library", "library", "--no-picture", "--max-probes", "2"), cwd=tmp_path
     )
-    assert told.returncode == 0, told.stderr
-    lines = told.stderr.strip().splitlines()
+    assert told.code == 0, told.err
+    lines = told.err.strip().splitlines()
     assert lines == ["palpate: block: its winding was inverted (normals pointed inwards); mended"]
 
 
 def test_a_free_object_is_pushed_and_that_is_told(tmp_path):
     options = ("--object", "stapler", "--sensor", "finger", "--placement", "resting", "--free")
     more = ("--force", "2", "--max-probes", "2", "--no-picture")
-    told = palpate("episode", *options, *more, cwd=tmp_path)
-    assert told.returncode == 0, told.stderr
-    assert "it was pushed: " in told.stdout
-    held = palpate("episode", "--free", "--no-picture", cwd=tmp_path)
-    assert held.returncode == 2
-    assert "a free object has to stand" in held.stderr
+    told = run_here("episode", *options, *more, cwd=tmp_path)
+    assert told.code == 0, told.err
+    assert "it was pushed: " in told.out
+    held = run_here("episode", "--free", "--no-picture", cwd=tmp_path)
+    assert held.code == 2
+    assert "a free object has to stand" in held.err

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import trimesh
 from checker import signed_distances
+from command import run_here
 from oracles import blocks, box, model
-from test_cli import palpate
 
 from palpate.recognizer import Polyhedron, Recognizer
 from palpate.recognizer.twins import near_twins, sample_surface, surface_distances
@@ -78,14 +78,14 @@ def test_a_folder_is_checked_file_by_file(tmp_path):
     holed = box(60.0, 40.0, 20.0)
     holed.update_faces(np.arange(len(holed.faces)) > 0)
     holed.export(tmp_path / "holed.stl")
-    told = palpate("library", ".", cwd=tmp_path)
-    assert told.returncode == 0, told.stderr
-    lines = {line.split()[0]: line for line in told.stdout.splitlines() if ".stl" in line}
+    told = run_here("library", ".", cwd=tmp_path)
+    assert told.code == 0, told.err
+    lines = {line.split()[0]: line for line in told.out.splitlines() if ".stl" in line}
     assert "unusable" in lines["holed.stl"]
     assert "closed" in lines["holed.stl"]
     assert lines["whole.stl"].split()[1:4] == ["6", "74.8", "4"]
     assert "is it in m?" in lines["small.stl"]
-    assert "again and whole are the same part" in told.stdout
+    assert "again and whole are the same part" in told.out
 
 
 def test_a_folder_that_is_none_is_one_line(tmp_path):
@@ -94,7 +94,7 @@ def test_a_folder_that_is_none_is_one_line(tmp_path):
         ((".",), "no mesh in this folder"),
         ((".", "--units", "ell"), "units is 'ell'"),
     ):
-        told = palpate("library", *arguments, cwd=tmp_path)
-        assert told.returncode == 2
-        assert words in told.stderr
-        assert told.stderr.count("\n") == 1
+        told = run_here("library", *arguments, cwd=tmp_path)
+        assert told.code == 2
+        assert words in told.err
+        assert told.err.count("\n") == 1

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from command import run_here
 from oracles import model, random_pose, surface_points
 from scipy.spatial.transform import RigidTransform
-from test_cli import palpate
 
 from palpate.assets import mesh_path
 from palpate.recognizer import Contacts, Recognizer, SupportPlane, diagnose, pose_difference
@@ -47,9 +47,9 @@ def write(path: Path, positions: np.ndarray, normals: np.ndarray | None = None) 
 
 
 def recognised(parts: Path, path: Path, *options: str) -> str:
-    told = palpate("recognize", path.name, "--library", str(parts), *options, cwd=path.parent)
-    assert told.returncode == 0, told.stderr
-    return told.stdout
+    told = run_here("recognize", path.name, "--library", str(parts), *options, cwd=path.parent)
+    assert told.code == 0, told.err
+    return told.out
 
 
 def test_a_part_in_millimetres_is_recognised_with_one_command(parts, tmp_path):
@@ -114,10 +114,10 @@ def test_bad_input_is_one_line_that_names_file_and_row(parts, tmp_path):
         ("good.csv", ("--library", "nowhere"), "nowhere: no such folder"),
         ("good.csv", ("--library", str(parts), "--units", "yards"), "units is 'yards'"),
     ):
-        told = palpate("recognize", name, *options, cwd=tmp_path)
-        assert told.returncode == 2
-        assert told.stderr.count("\n") == 1
-        assert words in told.stderr
+        told = run_here("recognize", name, *options, cwd=tmp_path)
+        assert told.code == 2
+        assert told.err.count("\n") == 1
+        assert words in told.err
 
 
 def test_a_plane_that_is_not_where_it_was_said_to_be_is_found_out():
