@@ -208,7 +208,7 @@ def _search(
     finest = _finest(contacts, test.radius)
     # Leaves in cells are dear, and a longer search would decide few more of them.
     pool = test.pool // SHARE_IN_CELLS if finest > 0.0 else test.pool
-    *found, nodes, counts = search_kernels.search_model(
+    faces, turns, shifts, costs, informations, proven, nodes, counts = search_kernels.search_model(
         kernel_contacts(contacts),
         contacts.normal_error,
         test.model,
@@ -227,7 +227,7 @@ def _search(
         finest,
         MOST_CELLS,
     )
-    return Poses(*found), nodes, counts
+    return Poses(faces, turns, shifts, costs, informations, proven), nodes, counts
 
 
 def _search_standing(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from pathlib import Path
 
 import numpy as np
 from command import run_here
@@ -39,7 +40,7 @@ def compiled() -> set[str]:
 
 def play_episodes() -> None:
     for options in EPISODES:
-        told = run_here("episode", "--no-picture", *options.split(), cwd=".")
+        told = run_here("episode", "--no-picture", *options.split(), cwd=Path())
         assert told.code == 0, told.err
 
 
@@ -62,10 +63,14 @@ def recognize_otherwise(solid: Polyhedron, rng: np.random.Generator) -> None:
 
 
 def touch(shape: Polyhedron | Polygon, count: int, rng: np.random.Generator) -> Contacts:
-    errors = {"position_error": 0.01 * shape.diameter, "normal_error": 0.2}
+    position_error, normal_error = 0.01 * shape.diameter, 0.2
     if isinstance(shape, Polygon):
-        return feel(shape, count, rng, **errors).contacts
-    return random_contacts(shape, random_pose(rng, 1.0), count, rng, **errors)[0]
+        given = feel(shape, count, rng, position_error=position_error, normal_error=normal_error)
+        return given.contacts
+    pose = random_pose(rng, 1.0)
+    return random_contacts(
+        shape, pose, count, rng, position_error=position_error, normal_error=normal_error
+    )[0]
 
 
 if __name__ == "__main__":
