@@ -78,17 +78,17 @@ smoke: wheel
 	test -s out.png
 
 bench: $(DEV) $(COMPILED)
-	@$(BIN)/python -m palpate.scripts.bench $(ARGS)
+	@$(BIN)/python -m palpate.scripts.lab.bench $(ARGS)
 
 bench-touch: $(DEV) $(COMPILED)
-	@$(BIN)/python -m palpate.scripts.bench_touch $(ARGS)
+	@$(BIN)/python -m palpate.scripts.lab.bench.touch $(ARGS)
 
 soundness: $(DEV) $(COMPILED)
-	@$(BIN)/python -m palpate.scripts.soundness $(ARGS)
+	@$(BIN)/python -m palpate.scripts.lab.soundness $(ARGS)
 	@$(BIN)/pytest -n auto --maxprocesses 8 -m slow
 
 soak: $(DEV) $(COMPILED)
-	@$(BIN)/python -m palpate.scripts.soak $(ARGS)
+	@$(BIN)/python -m palpate.scripts.lab.soak $(ARGS)
 
 format: $(DEV)
 	@$(BIN)/ruff check --fix --quiet . || true

@@ -15,15 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .obj_file import DECIMALS
-from .solids import (
-    Points,
-    box,
-    chamfered_rectangle,
-    extrude,
-    place,
-    regular_polygon,
-    turn_half,
-)
+from .solids import Points, box, chamfered_rectangle, extrude, place, regular_polygon, turn_half
 
 METRES_PER_INCH = 0.0254
 

@@ -12,8 +12,8 @@ from gymnasium import spaces
 from scipy.spatial.transform import Rotation
 
 from ..recognizer import Belief, Contacts
-from ..recognizer.predict import PoseSamples
-from .touch import Touch
+from ..recognizer.predict.prediction import PoseSamples
+from .sensors.touch import Touch
 
 Observation = dict[str, Any]
 """Arrays by name, as `ObservationLayout.space` has them."""

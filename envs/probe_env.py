@@ -21,22 +21,22 @@ from ..recognizer import (
     SearchLimits,
     SupportPlane,
 )
-from ..recognizer.pose_samples import sample_belief
-from ..recognizer.predict import PoseSamples
-from .evidence import Evidence
-from .finger_sensor import FingerSensor
-from .free_body import STILL
-from .free_object import SINK, FreeObject
+from ..recognizer.predict.pose_samples import sample_belief
+from ..recognizer.predict.prediction import PoseSamples
 from .library import LibrarySource, load_library
-from .noise import Distribution, SensorNoise
 from .observation import Observation, ObservationLayout
-from .placement import make_placement
-from .scene import ProbeScene, check_size
-from .sensors import make_sensors
-from .touch import ProbeCommand, Sensor, Touch
+from .scene.free_body import STILL
+from .scene.free_object import SINK, FreeObject
+from .scene.placement import make_placement
+from .scene.scene import ProbeScene, check_size
+from .sensors.evidence import Evidence
+from .sensors.finger_sensor import FingerSensor
+from .sensors.noise import Distribution, SensorNoise
+from .sensors.sensors import make_sensors
+from .sensors.touch import ProbeCommand, Sensor, Touch
 
 if TYPE_CHECKING:
-    from .episode_view import EpisodeView
+    from .pictures.episode_view import EpisodeView
 
 INCH = 0.0254
 HALF_WIDTH = 0.375
@@ -415,6 +415,6 @@ def _view(mode: str) -> EpisodeView:
     if mode not in ProbeEnv.metadata["render_modes"]:
         known = (None, *ProbeEnv.metadata["render_modes"])
         raise ValueError(f"render_mode is {mode!r}; it must be one of {known}")
-    from .episode_view import EpisodeView  # matplotlib comes with it
+    from .pictures.episode_view import EpisodeView  # matplotlib comes with it
 
     return EpisodeView(mode)

@@ -8,8 +8,8 @@ import numpy as np
 
 from ..recognizer import PoseTolerance, SearchLimits
 from .library import LibrarySource
-from .noise import Distribution
 from .probe_env import INCH, ProbeEnv
+from .sensors.noise import Distribution
 
 
 class ProbeRestEnv(ProbeEnv):

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .noise import SensorNoise
+from .sensors.noise import SensorNoise
 
 
 def warm_up() -> None:

@@ -13,6 +13,7 @@ from .grid import Grid
 from .information import Information
 from .lookahead import Lookahead
 from .minimax import Minimax
+from .outcomes.task import GOALS, Goal, Task
 from .pairs import Pairs
 from .policy import Policy
 from .pruning import Pruning
@@ -22,7 +23,6 @@ from .rate import Rate
 from .refine import Refine
 from .safe_region import SafeRegion
 from .separation import Separation
-from .task import GOALS, Goal, Task
 
 __all__ = [
     "GOALS",

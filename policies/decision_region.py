@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .outcomes import Outcomes
-from .rivals import answers
-from .task import Observation, Task
-from .weighing import best_probe
+from .outcomes.outcomes import Outcomes
+from .outcomes.rivals import answers
+from .outcomes.task import Observation, Task
+from .outcomes.weighing import best_probe
 
 Floats = NDArray[np.float64]
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..recognizer import FreeSpace
-from .reports import Purpose, Suggestion
+from .outcomes.reports import Purpose, Suggestion
 from .straight import Reach
 
 Floats = NDArray[np.float64]

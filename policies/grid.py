@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .task import Observation, Task
-from .weighing import as_action
+from .outcomes.task import Observation, Task
+from .outcomes.weighing import as_action
 
 SIDE = 5
 """Points of the grid along either side of the workspace."""

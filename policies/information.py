@@ -7,9 +7,9 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from .outcomes import Outcomes
-from .task import Observation, Task
-from .weighing import best_probe, precision
+from .outcomes.outcomes import Outcomes
+from .outcomes.task import Observation, Task
+from .outcomes.weighing import best_probe, precision
 
 Floats = NDArray[np.float64]
 

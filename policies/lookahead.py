@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .information import gain_of_answers, information
-from .task import Observation, Task
-from .weighing import best_probe
+from .outcomes.task import Observation, Task
+from .outcomes.weighing import best_probe
 
 Floats = NDArray[np.float64]
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from .outcomes import Outcomes
-from .task import Observation, Task
-from .weighing import best_probe
+from .outcomes.outcomes import Outcomes
+from .outcomes.task import Observation, Task
+from .outcomes.weighing import best_probe
 
 Floats = NDArray[np.float64]
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..recognizer.predict import MET_OBJECT, predict
-from .task import Observation, Task
-from .weighing import random_action
+from ..recognizer.predict.prediction import MET_OBJECT, predict
+from .outcomes.task import Observation, Task
+from .outcomes.weighing import random_action
 
 TRIES = 64
 """Random probes looked at; if no pose says of any that it touches, the first is sent."""

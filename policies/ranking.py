@@ -11,24 +11,24 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from ..recognizer import Belief
-from ..recognizer.pose_samples import sample_belief
-from ..recognizer.predict import MET_OBJECT, PoseSamples, Predictions, predict
-from ..recognizer.probes import ProbeSpace, TriadRays
+from ..recognizer.predict.pose_samples import sample_belief
+from ..recognizer.predict.prediction import MET_OBJECT, PoseSamples, Predictions, predict
+from ..recognizer.predict.probes import ProbeSpace, TriadRays
 from .decision_region import edges_cut
 from .information import information
 from .lookahead import two_ahead
 from .minimax import worst_case
-from .outcomes import Outcomes
+from .outcomes.outcomes import Outcomes
+from .outcomes.reports import Purpose, Suggestion, reports_of
+from .outcomes.rivals import taken, thinned
+from .outcomes.task import Observation, Task
+from .outcomes.weighing import TELLS_NOTHING, evened, precision
 from .pairs import pairs_told_apart
 from .pruning import weight_removed
 from .rate import Rate
 from .refine import log_determinant
-from .reports import Purpose, Suggestion, reports_of
-from .rivals import taken, thinned
 from .separation import separation
 from .straight import LEVEL, Reach, Region, Touches, across_direction
-from .task import Observation, Task
-from .weighing import TELLS_NOTHING, evened, precision
 
 Floats = NDArray[np.float64]
 

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .information import information
-from .outcomes import Outcomes
-from .task import Observation, Task
-from .weighing import best_probe
+from .outcomes.outcomes import Outcomes
+from .outcomes.task import Observation, Task
+from .outcomes.weighing import best_probe
 
 Floats = NDArray[np.float64]
 

@@ -6,10 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .information import Information
-from .outcomes import Outcomes
-from .pose_information import gain
-from .task import Observation, Task
-from .weighing import expected_gain, settling_probe
+from .outcomes.outcomes import Outcomes
+from .outcomes.pose_information import gain
+from .outcomes.task import Observation, Task
+from .outcomes.weighing import expected_gain, settling_probe
 
 Floats = NDArray[np.float64]
 

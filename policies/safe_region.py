@@ -6,10 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_edt, label
 
-from .outcomes import Outcomes
-from .pairs import pairs_told_apart
-from .task import Observation, Task
-from .weighing import (
+from .outcomes.outcomes import Outcomes
+from .outcomes.task import Observation, Task
+from .outcomes.weighing import (
     TELLS_NOTHING,
     Budget,
     as_action,
@@ -18,6 +17,7 @@ from .weighing import (
     settling_probe,
     weighed,
 )
+from .pairs import pairs_told_apart
 
 Floats = NDArray[np.float64]
 

@@ -20,8 +20,8 @@ from ..recognizer import (
     SupportPlane,
 )
 from .first_touch import first_touches
+from .outcomes.reports import Suggestion
 from .ranking import FORMULAS, ranked_touches
-from .reports import Suggestion
 from .straight import Reach, Region
 
 CLEARANCE = 0.02

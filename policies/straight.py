@@ -13,9 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from ..recognizer import SupportPlane
-from ..recognizer.predict import PoseSamples
-from ..recognizer.probes import TriadRays
-from ..recognizer.twins import sample_surface
+from ..recognizer.advice.twins import sample_surface
+from ..recognizer.predict.prediction import PoseSamples
+from ..recognizer.predict.probes import TriadRays
 
 Floats = NDArray[np.float64]
 

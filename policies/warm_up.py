@@ -9,10 +9,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from ..recognizer import Polyhedron
-from ..recognizer.predict import samples_of
-from ..recognizer.probes import ProbeSpace
-from .outcomes import Outcomes
-from .task import Task
+from ..recognizer.predict.prediction import samples_of
+from ..recognizer.predict.probes import ProbeSpace
+from .outcomes.outcomes import Outcomes
+from .outcomes.task import Task
 
 
 def warm_up() -> None:

@@ -21,20 +21,20 @@ outwards; a bound is the radius of a ball (position) or the half-angle of a cone
 the truth for certain.
 """
 
+from .advice.diagnosis import Finding, diagnose
 from .belief import Belief, Search
-from .comparison import PoseDifference, pose_difference
-from .contact_file import FeltFile, read_contacts
-from .contacts import ANYTHING, EDGE, FACE, VERTEX, Contacts
-from .diagnosis import Finding, diagnose
-from .free_space import FreeSpace
-from .hypotheses import Hypothesis, PoseTolerance
-from .library import load_folder
-from .polygon import Polygon
-from .polyhedron import Polyhedron
-from .ranges import PairTables
+from .beliefs.comparison import PoseDifference, pose_difference
+from .beliefs.hypotheses import Hypothesis, PoseTolerance
+from .contacts.contact_file import FeltFile, read_contacts
+from .contacts.contacts import ANYTHING, EDGE, FACE, VERTEX, Contacts
+from .contacts.free_space import FreeSpace
+from .contacts.support import SupportPlane
+from .models.folder import load_folder
+from .models.polygon import Polygon
+from .models.polyhedron import Polyhedron
 from .recognize import Recognizer, SearchLimits
-from .support import SupportPlane
-from .tree import Constraints
+from .tables.ranges import PairTables
+from .tree.tree import Constraints
 
 __all__ = [
     "ANYTHING",

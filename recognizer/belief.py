@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from .contacts import Contacts
-from .free_space import FreeSpace
-from .hypotheses import Hypothesis
-from .support import SupportPlane
+from .beliefs.hypotheses import Hypothesis
+from .contacts.contacts import Contacts
+from .contacts.free_space import FreeSpace
+from .contacts.support import SupportPlane
 
 if TYPE_CHECKING:
     from .recognize import Recognizer

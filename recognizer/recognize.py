@@ -12,20 +12,20 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
 from .belief import Belief, Search
-from .contacts import EDGE, Contacts
-from .extent import pin_down
-from .features import Features
-from .free_space import FreeSpace
-from .hypotheses import Hypothesis, PoseTolerance
-from .planar_recognize import PlanarEntry, search_polygon, span_polygon
-from .polygon import Polygon
-from .polyhedron import Polyhedron
-from .ranges import PairTables
-from .solid_recognize import SolidEntry, search_solid, span_solid
-from .support import SupportPlane
-from .surroundings import Surroundings
-from .tree import Constraints, spread_order
-from .tree_kernels import least_span
+from .beliefs.extent import pin_down
+from .beliefs.hypotheses import Hypothesis, PoseTolerance
+from .beliefs.outline import PlanarEntry, search_polygon, span_polygon
+from .beliefs.solid import SolidEntry, search_solid, span_solid
+from .contacts.contacts import EDGE, Contacts
+from .contacts.free_space import FreeSpace
+from .contacts.support import SupportPlane
+from .models.features import Features
+from .models.polygon import Polygon
+from .models.polyhedron import Polyhedron
+from .poses.surroundings.surroundings import Surroundings
+from .tables.ranges import PairTables
+from .tree.tree import Constraints, spread_order
+from .tree.tree_kernels import least_span
 
 Found = tuple[list[Hypothesis], NDArray[np.float64], Search]
 

@@ -10,19 +10,19 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import RigidTransform
 
-from .contacts import Contacts
-from .free_space import FreeSpace
-from .polygon import Polygon
-from .polyhedron import Polyhedron
-from .pose_samples import sample_belief
-from .predict import predict
-from .probes import ProbeSpace
-from .rays import cast_rays
+from .contacts.contacts import Contacts
+from .contacts.free_space import FreeSpace
+from .contacts.support import SupportPlane
+from .models.polygon import Polygon
+from .models.polyhedron import Polyhedron
+from .models.rays import cast_rays
+from .poses.surroundings.repair import repair
+from .poses.surroundings.surroundings import Surroundings, bounds_of
+from .predict.pose_samples import sample_belief
+from .predict.prediction import predict
+from .predict.probes import ProbeSpace
 from .recognize import Recognizer
-from .repair import repair
-from .support import SupportPlane
-from .surroundings import Surroundings, bounds_of
-from .tree import Constraints, prune
+from .tree.tree import Constraints, prune
 
 
 def warm_up() -> None:

@@ -11,14 +11,14 @@ from typing import Annotated
 
 import typer
 
-from .benchmark import benchmark
-from .episode import episode
-from .library import library
-from .recognize import recognize
-from .report import report
-from .reproduce import reproduce
-from .suggest import suggest
-from .view import view
+from .commands.benchmark import benchmark
+from .commands.episode import episode
+from .commands.library import library
+from .commands.recognize import recognize
+from .commands.report import report
+from .commands.reproduce import reproduce
+from .commands.suggest import suggest
+from .commands.view import view
 
 __all__ = ["app", "main"]
 

@@ -45,7 +45,7 @@ def modules_of(folder: str) -> list[Path]:
 
 
 def import_name(path: Path) -> str:
-    """``palpate.envs.picture`` for the file ``envs/picture.py``."""
+    """``palpate.envs.pictures.picture`` for the file ``envs/pictures/picture.py``."""
     return ".".join(("palpate", *path.relative_to(ROOT).with_suffix("").parts))
 
 
@@ -123,8 +123,8 @@ def test_data_flows_one_way():
 @pytest.mark.parametrize(
     ("module", "line"),
     [
-        ("palpate.recognizer.tree", "import mujoco"),
-        ("palpate.recognizer.tree", "def f():\n    from ..assets import mesh_path"),
+        ("palpate.recognizer.tree.tree", "import mujoco"),
+        ("palpate.recognizer.tree.tree", "def f():\n    from ..assets import mesh_path"),
         ("palpate.assets.build", "from .. import recognizer"),
         ("palpate.policies.greedy", "from palpate.envs import picture"),
         ("palpate.envs.probe", "from ..policies.greedy import Greedy"),
@@ -138,9 +138,12 @@ def test_an_import_against_the_flow_is_noticed(module, line):
 @pytest.mark.parametrize(
     ("module", "line"),
     [
-        ("palpate.recognizer.tree", "import os.path, numpy as np\nfrom . import tree_kernels"),
+        ("palpate.recognizer.tree.tree", "import os.path, numpy as np\nfrom . import tree_kernels"),
         ("palpate.envs.probe", "import mujoco\nfrom ..recognizer.contacts import Contacts"),
-        ("palpate.scripts.episode", "from ..envs import picture\nfrom palpate.policies import x"),
+        (
+            "palpate.scripts.commands.episode",
+            "from ..envs import picture\nfrom palpate.policies import x",
+        ),
     ],
 )
 def test_an_import_along_the_flow_is_allowed(module, line):

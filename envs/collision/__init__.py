@@ -1,0 +1,1 @@
+"""Exact convex parts of objects, which MuJoCo collides with."""

@@ -1,0 +1,1 @@
+"""Probing outlines in the plane (memo, 4.1)."""

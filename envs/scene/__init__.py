@@ -1,0 +1,1 @@
+"""The MuJoCo scene: objects, where they are put, the finger."""

@@ -1,0 +1,1 @@
+"""What a probe would tell the rivals apart by: reports of one predictor, weighed."""

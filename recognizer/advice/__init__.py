@@ -1,0 +1,1 @@
+"""What to tell people: a verdict in words, why nothing fits, which parts look alike."""

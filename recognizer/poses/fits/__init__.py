@@ -1,0 +1,1 @@
+"""Best fits of an interpretation, its verdict, and the poses that it leaves open."""

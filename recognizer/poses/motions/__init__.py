@@ -1,0 +1,1 @@
+"""Small turns and shifts of a pose, and how far directions may be turned."""

@@ -1,0 +1,1 @@
+"""Proofs that no pose in a region of rotations meets every bound."""

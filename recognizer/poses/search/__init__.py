@@ -1,0 +1,1 @@
+"""Tree and model test as one search over a solid."""

@@ -1,0 +1,1 @@
+"""What poses that stand for a belief say a probe would meet."""

@@ -1,0 +1,1 @@
+"""The interpretation tree: bit sets of features, pruned by pairs, forward checking (memo, 2)."""

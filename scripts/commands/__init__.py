@@ -1,0 +1,1 @@
+"""The commands of `palpate`, one a file."""

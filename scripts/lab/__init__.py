@@ -1,0 +1,1 @@
+"""What developers measure with: soundness, soak and benchmarks. Not in the wheel."""

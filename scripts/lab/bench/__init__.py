@@ -1,0 +1,1 @@
+"""Speed and accuracy, each figure beside its goal: `make bench`, `make bench-touch`."""

@@ -1,0 +1,1 @@
+"""Thousands of random and extreme steps in each environment: `make soak`."""

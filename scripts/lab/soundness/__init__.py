@@ -1,0 +1,1 @@
+"""Random cases and whole episodes: is the truth ever lost? `make soundness`."""

@@ -1,0 +1,1 @@
+"""The memo's experiments rerun (`palpate reproduce`)."""

@@ -1,0 +1,1 @@
+"""The memo's bounds on the size of the tree (Section 6)."""

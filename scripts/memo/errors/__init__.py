@@ -1,0 +1,1 @@
+"""Pose errors beside the memo's Table V."""

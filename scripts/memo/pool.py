@@ -1,0 +1,91 @@
+"""How the memo's experiments are run: their cases on the processes there are, under a bar."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass
+from multiprocessing import get_context
+from typing import TYPE_CHECKING, TypeVar
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+Case = TypeVar("Case")
+Result = TypeVar("Result")
+
+
+@dataclass(eq=False)
+class PoolPlan:
+    """A `memo_section.Plan`: what was asked for, and who runs it."""
+
+    trials: int | None
+    seed: int
+    console: Console
+    """Where progress is shown, if it is a terminal."""
+    pool: ProcessPoolExecutor | None
+    """None: this process runs the cases itself."""
+
+    def map(
+        self, function: Callable[[Case], Result], cases: Sequence[Case], label: str
+    ) -> Iterable[Result]:
+        """Results in the order of the cases; see `memo_section.Plan`."""
+        if self.pool is None:
+            results: Iterable[Result] = map(function, cases)
+        else:
+            results = self.pool.map(function, cases)
+        return _under_a_bar(results, len(cases), label, self.console)
+
+
+@contextmanager
+def open_plan(trials: int | None, seed: int, workers: int, console: Console) -> Iterator[PoolPlan]:
+    """A plan with as many processes as are asked for; they end with it.
+
+    Args:
+        trials: a row; None for as many as the memo ran.
+        seed: of all cases.
+        workers: processes; with one, no other than this.
+        console: where progress is shown, if it is a terminal.
+    """
+    from ..lab.bench.__main__ import keep_to_one_thread
+
+    keep_to_one_thread()
+    if workers == 1:
+        yield PoolPlan(trials, seed, console, None)
+        return
+    # A process that is forked while others run threads can hang.
+    pool = ProcessPoolExecutor(workers, get_context("spawn"), initializer=_leave_interrupts)
+    try:
+        yield PoolPlan(trials, seed, console, pool)
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def processors() -> int:
+    """How many processors this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def _leave_interrupts() -> None:
+    """Let the process that was started by hand answer Ctrl-C, for all."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+def _under_a_bar(
+    results: Iterable[Result], total: int, label: str, console: Console
+) -> Iterator[Result]:
+    from rich.progress import Progress
+
+    from ..progress_bar import columns
+
+    shown = console.is_terminal
+    with Progress(*columns(), console=console, transient=True, disable=not shown) as bar:
+        task = bar.add_task(label, total=total)
+        for result in results:
+            bar.advance(task)
+            yield result

@@ -1,0 +1,1 @@
+"""Range data (memo, Section 5)."""

@@ -1,0 +1,71 @@
+"""What a rerun experiment of the memo comes to: a section of the page, and every row judged."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Literal, Protocol, TypeVar
+
+from ..report.page import Block
+
+Case = TypeVar("Case")
+Result = TypeVar("Result")
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A row that the memo prints, beside ours."""
+
+    key: tuple[str, ...]
+    """What the row is about, such as ("housing", "π/10", "0.05 in")."""
+    names: tuple[str, ...]
+    """What each figure is, such as ("least", "median", "90 %", "most")."""
+    memo: tuple[float, ...] | None
+    """The printed figures; None where the memo prints none, or its print is damaged."""
+    ours: tuple[float, ...]
+    verdict: Literal["within", "outside", "not judged"]
+    why: str
+    """Why it is outside or not judged; empty if within."""
+
+
+@dataclass(frozen=True)
+class Section:
+    """An experiment: what was asked, what was done, what came out."""
+
+    name: str
+    """As on the command line, such as "table2"."""
+    title: str
+    place: str
+    """Where the memo has it, such as "Section 4.3, Table II"."""
+    asked: str
+    done: str
+    found: str
+    blocks: tuple[Block, ...]
+    """Tables and figures in the order in which they are read."""
+    comparisons: tuple[Comparison, ...]
+    checked: int
+    """Trials in which it was looked whether the right interpretation was kept."""
+    lost: int
+    """Those of them that discarded it."""
+
+
+class Plan(Protocol):
+    """How an experiment is to be run."""
+
+    trials: int | None
+    """Trials a row; None for as many as the memo ran."""
+    seed: int
+
+    def map(
+        self, function: Callable[[Case], Result], cases: Sequence[Case], label: str
+    ) -> Iterable[Result]:
+        """Results in the order of the cases, on the processes there are, with progress shown.
+
+        The function is one of a module, so that other processes find it. A case holds what it
+        needs, its own seed too, so that results don't depend on the number of processes.
+        """
+        ...
+
+
+Experiment = Callable[[Plan], Section]
+"""What each `memo_*` module has as `run`."""

@@ -1,0 +1,236 @@
+"""One trial of the memo's experiments in space: contacts in, counts at each stage out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...assets import memo
+
+if TYPE_CHECKING:
+    from ...envs.sensors.grid import TrueContacts
+    from ...envs.sensors.noise import SensorNoise
+    from ...recognizer import Contacts, PairTables, Polyhedron
+    from ...recognizer.poses.fits.pose import ModelTest, Poses
+    from .coarse import MemoPoses
+    from .section import Plan
+
+Floats = NDArray[np.float64]
+
+DIRECTION_TOLERANCE = np.radians(1.5)
+"""Directions of rotation less far apart are the same (memo, Section 4.3), radians."""
+SHIFT_TOLERANCES_IN = (0.01, 0.05)
+"""Translations less far apart are the same (memo, Table VI), inches."""
+BATCH = 10
+"""Trials that a process is given at a time."""
+
+Stage = Literal["tree", "test", "memo"]
+"""How far to go: the tree alone, the model test and transforms too, the memo's own test besides."""
+
+
+@dataclass(frozen=True)
+class Spec:
+    """An object, and bounds on what is measured of it."""
+
+    object_name: str
+    pi_over: int
+    """The bound on normals is pi over this, radians."""
+    position_error_in: float
+    """The bound on positions, inches."""
+
+    @classmethod
+    def of(cls, row: memo.CountRow | memo.ClusterRow) -> Spec:
+        """What a row of the memo's is about."""
+        return cls(row.object_name, row.pi_over, row.position_error_in)
+
+    @property
+    def key(self) -> tuple[str, str, str]:
+        """As shown."""
+        return self.object_name, f"π/{self.pi_over}", f"{self.position_error_in:.2f} in"
+
+    @property
+    def levels(self) -> tuple[float, float]:
+        """Where it stands on the axes of noise."""
+        return 1.0 / self.pi_over, self.position_error_in
+
+    def noise(self) -> SensorNoise:
+        """The bounds in metres and radians."""
+        from ...envs.probe_env import INCH
+        from ...envs.sensors.noise import SensorNoise
+
+        return SensorNoise(
+            position_error=self.position_error_in * INCH, normal_error=np.pi / self.pi_over
+        )
+
+
+@dataclass(frozen=True)
+class Batch:
+    """Trials of one row, with all that another process needs to run them."""
+
+    spec: Spec
+    seed: int
+    first: int
+    stop: int
+    stage: Stage
+
+    def generators(self) -> list[np.random.Generator]:
+        """One a trial. Every row sees the same cases, so that rows differ by their noise alone."""
+        return [np.random.default_rng([self.seed, trial]) for trial in range(self.first, self.stop)]
+
+
+@dataclass(frozen=True)
+class TrialCounts:
+    """What one trial left at each stage."""
+
+    contacts: int
+    pruned: int
+    """Interpretations that the tree left."""
+    kept: bool
+    """Whether the right one is among what the last stage left."""
+    complete: bool
+    """Whether the tree was searched to its end."""
+    tested: int = 0
+    """Interpretations that the model test left."""
+    directions: int = 0
+    """Distinct directions of rotation: the memo's transforms."""
+    shifted: tuple[int, ...] = ()
+    """Distinct directions of rotation and translations, for each of `SHIFT_TOLERANCES_IN`."""
+    poses: tuple[int, ...] = ()
+    """Distinct poses by the angle between rotations and the distance of centroids, likewise."""
+    memo_poses: MemoPoses | None = None
+    """The poses that the memo's own method gives what the tree left."""
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """An object with its tables and its model test."""
+
+    model: Polyhedron
+    tables: PairTables
+    test: ModelTest
+
+
+@cache
+def prepared(object_name: str) -> Prepared:
+    """An object of the library, once a process."""
+    from ...envs.library import load_library
+    from ...recognizer import PairTables
+    from ...recognizer.poses.fits.pose import ModelTest
+
+    model = next(model for model in load_library() if model.name == object_name)
+    return Prepared(model, PairTables.of(model), ModelTest(model))
+
+
+def batches(stages: Mapping[Spec, Stage], seed: int, trials: int) -> list[Batch]:
+    """All trials of all rows, in order; each row as far as it is to go."""
+    return [
+        Batch(spec, seed, first, min(first + BATCH, trials), stage)
+        for spec, stage in stages.items()
+        for first in range(0, trials, BATCH)
+    ]
+
+
+def gather(
+    plan: Plan,
+    work: Sequence[Batch],
+    run: Callable[[Batch], list[TrialCounts]],
+    label: str,
+) -> dict[Spec, list[TrialCounts]]:
+    """Run batches; the trials of each row."""
+    runs: dict[Spec, list[TrialCounts]] = {batch.spec: [] for batch in work}
+    for batch, counts in zip(work, plan.map(run, work, label), strict=True):
+        runs[batch.spec] += counts
+    return runs
+
+
+def count_stages(
+    object_name: str, truth: TrueContacts, contacts: Contacts, stage: Stage
+) -> TrialCounts:
+    """Prune the tree and, if asked for, test and group what is left of it."""
+    from ...recognizer.tree.tree import prune
+    from .coarse import memo_poses
+
+    thing = prepared(object_name)
+    left = prune(thing.tables, contacts)
+    kept = bool((left.faces == truth.faces).all(axis=1).any())
+    if stage == "tree":
+        return TrialCounts(len(contacts), len(left.faces), kept, left.complete)
+    poses = thing.test.run(left.faces, contacts)
+    kept = bool((poses.faces == truth.faces).all(axis=1).any())
+    return TrialCounts(
+        len(contacts),
+        len(left.faces),
+        kept,
+        left.complete,
+        len(poses),
+        *count_transforms(poses, thing.model.centroid),
+        memo_poses(thing.model, left.faces, truth.faces, contacts) if stage == "memo" else None,
+    )
+
+
+def count_transforms(
+    poses: Poses, centroid: NDArray[np.float64]
+) -> tuple[int, tuple[int, ...], tuple[int, ...]]:
+    """How many transforms poses come to: by direction, with translations too, and by poses.
+
+    Best fits come first; a pose opens a group of its own unless it is like the first of another.
+    """
+    poses = poses.take(np.lexsort((poses.costs, ~poses.proven)))
+    axes, shifts = directions_of(poses.rotations), poses.translations
+    centres = shifts + poses.rotations @ centroid
+    # The product of two rotations' entries is the trace of the one between them: 1 + 2 cos of it.
+    flat = poses.rotations.reshape(-1, 9)
+    turned = (flat, 1.0 + 2.0 * np.cos(DIRECTION_TOLERANCE))
+    aligned = (axes, np.cos(DIRECTION_TOLERANCE))
+    return (
+        count_groups(*aligned),
+        tuple(count_groups(*aligned, shifts, tolerance) for tolerance in SHIFT_TOLERANCES_IN),
+        tuple(count_groups(*turned, centres, tolerance) for tolerance in SHIFT_TOLERANCES_IN),
+    )
+
+
+def directions_of(rotations: Floats) -> Floats:
+    """(m, 3) unit vectors about which (m, 3, 3) rotations turn, by an angle between 0 and π.
+
+    A rotation by nothing has none; zeros stand for it.
+    """
+    from scipy.spatial.transform import Rotation
+
+    turns = Rotation.from_matrix(rotations).as_rotvec()
+    return turns / np.maximum(np.linalg.norm(turns, axis=1), 1e-300)[:, None]
+
+
+def count_groups(
+    turns: Floats,
+    least_product: float,
+    places: Floats | None = None,
+    most_apart_in: float = np.inf,
+) -> int:
+    """How many groups poses form, each around the first pose that is in none before it.
+
+    Args:
+        turns: (m, k) rows whose products say how alike rotations are.
+        least_product: of two that are alike.
+        places: (m, 3) metres.
+        most_apart_in: the largest distance of places that are alike, inches.
+    """
+    from ...envs.probe_env import INCH
+
+    def alike(leader: int, others: NDArray[np.intp]) -> NDArray[np.bool_]:
+        near = turns[others] @ turns[leader] >= least_product
+        if places is not None:
+            apart = np.linalg.norm(places[others] - places[leader], axis=1)
+            near &= apart <= most_apart_in * INCH
+        return near
+
+    count = len(turns)
+    rest, groups = np.arange(count), 0
+    while len(rest):
+        groups += 1
+        rest = rest[1:][~alike(int(rest[0]), rest[1:])]
+    return groups

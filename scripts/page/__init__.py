@@ -1,0 +1,1 @@
+"""The page that a recognition or an episode is looked at on."""

@@ -1,0 +1,1 @@
+"""A page made of the rows of a benchmark."""

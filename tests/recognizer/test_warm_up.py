@@ -1,0 +1,19 @@
+"""What warming up compiles is all that people wait for, once."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+from helpers import late_compilation
+
+
+def test_nothing_is_compiled_after_warming_up():
+    # A process of its own: other tests give kernels arrays of all kinds.
+    call = [sys.executable, late_compilation.__file__]
+    run = subprocess.run(
+        call, capture_output=True, text=True, check=False, cwd=Path(__file__).parent
+    )
+    assert run.returncode == 0, run.stderr
+    assert run.stdout.strip() == ""

@@ -1,0 +1,318 @@
+"""`palpate report`: the statistics against plain oracles, and what a page says."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import replace
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pytest
+from helpers.made_up_rows import made_up_row, small
+
+from palpate.scripts.commands.benchmark import run_benchmark
+from palpate.scripts.commands.benchmark.store import RowStore
+from palpate.scripts.commands.report import write_report
+from palpate.scripts.commands.report.page import Code, Heading, Table, html, markdown
+from palpate.scripts.commands.report.plots import style_of
+from palpate.scripts.commands.report.results import poses_left, settle
+from palpate.scripts.commands.report.statistics import (
+    bootstrap,
+    distinguishable_outcomes,
+    floor_of_probes,
+    holm,
+    interquartile_means,
+    mean_differences,
+    means,
+    paired_p_value,
+    ratios_of_means,
+    wilson,
+)
+
+POLICIES = ("random", "random-hit", "quick", "lost")
+NEEDED = {"random": 10, "random-hit": 8, "quick": 4, "lost": 99}
+
+
+@pytest.mark.parametrize(
+    ("successes", "trials", "low", "high"),
+    [
+        # Newcombe, "Two-sided confidence intervals for the single proportion", 1998, table I.
+        (81, 263, 0.2553, 0.3662),
+        (15, 148, 0.0624, 0.1605),
+        (0, 20, 0.0, 0.1611),
+        (1, 29, 0.0061, 0.1718),
+    ],
+)
+def test_wilson_intervals_are_those_in_print(successes, trials, low, high):
+    found = wilson(successes, trials)
+    assert found.value == successes / trials
+    assert (found.low, found.high) == (pytest.approx(low, abs=5e-5), pytest.approx(high, abs=5e-5))
+
+
+def test_a_share_of_nothing_is_refused():
+    with pytest.raises(ValueError, match="0 of 0"):
+        wilson(0, 0)
+
+
+def test_bootstrap_intervals_hold_the_truth_about_as_often_as_they_say():
+    rng = np.random.default_rng(0)
+    held = []
+    for _ in range(300):
+        sample = rng.exponential(1.0, 60)
+        found = bootstrap([sample], ["one"] * 60, means, rng, draws=300)
+        assert found.value == pytest.approx(sample.mean())
+        held.append(found.low <= 1.0 <= found.high)
+    assert 0.88 < np.mean(held) < 0.98
+
+
+def test_strata_keep_their_sizes():
+    values = np.array([1.0] * 30 + [9.0] * 10)
+    strata = ["easy"] * 30 + ["hard"] * 10
+    rng = np.random.default_rng(0)
+    found = bootstrap([values], strata, means, rng)
+    assert (found.value, found.low, found.high) == (3.0, 3.0, 3.0)
+    assert bootstrap([values], ["one"] * 40, means, rng).low < 2.5
+
+
+def test_pairs_are_resampled_together():
+    rng = np.random.default_rng(0)
+    other = rng.integers(1, 40, 50).astype(float)
+    found = bootstrap([0.5 * other, other], ["one"] * 50, ratios_of_means, rng)
+    assert (found.low, found.high) == (pytest.approx(0.5), pytest.approx(0.5))
+    found = bootstrap([other - 3.0, other], ["one"] * 50, mean_differences, rng)
+    assert (found.low, found.high) == (pytest.approx(-3.0), pytest.approx(-3.0))
+
+
+def test_the_interquartile_mean_is_that_of_the_middle_half():
+    values = np.array([100.0, 2.0, 4.0, 6.0, 8.0, -50.0, 0.0, 10.0])
+    assert interquartile_means(values[None, :, None]) == pytest.approx([5.0])
+
+
+def test_a_permutation_test_counts_signs():
+    differences = np.array([3.0, -1.0, 2.0, 5.0, 0.0, -0.5])
+    moved = differences[differences != 0.0]
+    observed = abs(moved.mean())
+    signs = np.array(list(product((-1.0, 1.0), repeat=len(moved))))
+    as_far = np.abs((signs * moved).mean(axis=1)) >= observed - 1e-12
+    p = paired_p_value(differences, np.zeros(6), np.random.default_rng(0))
+    assert p == pytest.approx(as_far.mean())
+    assert paired_p_value(np.ones(4), np.ones(4), np.random.default_rng(0)) == 1.0
+
+
+def test_a_permutation_test_of_many_pairs_agrees_with_scipys():
+    from scipy.stats import permutation_test
+
+    rng = np.random.default_rng(0)
+    other = rng.integers(2, 30, 60).astype(float)
+    one = other + rng.uniform(-4.0, 3.0, 60)
+    theirs = permutation_test(
+        (one - other,), np.mean, permutation_type="samples", n_resamples=9999, rng=rng
+    )
+    assert 0.001 < theirs.pvalue < 0.2
+    assert paired_p_value(one, other, rng) == pytest.approx(theirs.pvalue, abs=0.012)
+
+
+def test_holm_corrects_step_by_step():
+    assert holm([0.01, 0.04, 0.03, 0.005]) == pytest.approx([0.03, 0.06, 0.06, 0.02])
+    assert holm([0.9, 0.8]) == [1.0, 1.0]
+
+
+@pytest.mark.parametrize(
+    ("rivals", "outcomes", "probes"),
+    [(1, 2, 0), (2, 2, 1), (8, 2, 3), (9, 2, 4), (1000, 10, 3), (125, 5, 3), (126, 5, 4)],
+)
+def test_the_floor_is_the_logarithm_rounded_up(rivals, outcomes, probes):
+    assert floor_of_probes(rivals, outcomes) == probes
+
+
+@pytest.mark.parametrize("normal_error", [0.1, np.pi / 10, np.pi / 8, 0.7, np.pi / 2])
+def test_no_more_normals_can_be_told_apart_than_the_floor_allows(normal_error):
+    rng = np.random.default_rng(0)
+    normals = rng.normal(size=(4000, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    apart: list[np.ndarray] = []
+    for normal in normals[normals[:, 2] > 0.0]:
+        if all(normal @ other < math.cos(2.0 * normal_error) for other in apart):
+            apart.append(normal)
+    # At one depth only: a missed ray, and these.
+    assert 1 + len(apart) <= distinguishable_outcomes(1e-9, 1.0, normal_error, rays=1)
+
+
+def test_depths_and_rays_multiply_what_can_be_told_apart():
+    # Two diameters of 0.1 m hold 11 depths that are 20 mm apart; flat normals tell nothing.
+    assert distinguishable_outcomes(0.1, 0.01, np.pi / 2, rays=1) == 1 + 11 * 2
+    assert distinguishable_outcomes(0.1, 0.01, np.pi / 2) == 23**3
+
+
+def played(folder: Path, **changes) -> Path:
+    config = small(policies=POLICIES, episodes=12, **changes)
+
+    def play(job):
+        return made_up_row(job, probes=NEEDED[job.policy])
+
+    run_benchmark(config, folder, play)
+    return folder
+
+
+def tables(page: str) -> list[list[list[str]]]:
+    """Rows of cells of each table of a Markdown page."""
+    found = re.findall(r"((?:^\|.*\|\n)+)", page, re.MULTILINE)
+    return [
+        [[cell.strip() for cell in line.strip("|").split("|")] for line in table.splitlines()]
+        for table in found
+    ]
+
+
+def test_a_page_has_the_figures_of_its_rows(tmp_path):
+    write_report(played(tmp_path), tmp_path / "page")
+    page = (tmp_path / "page.md").read_text()
+    glance, setting, compared, poses, decisions = tables(page)
+    assert glance[2][2:4] == ["quick", "4.00 [4.00, 4.00]"]
+    assert glance[2][5:] == [
+        "10.00 [10.00, 10.00]",
+        "40 % [40, 40]",
+        "8.00 [8.00, 8.00]",
+        "50 % [50, 50]",
+    ]
+    rows = {row[0].strip("*"): dict(zip(setting[0], row, strict=True)) for row in setting[2:]}
+    assert list(rows) == list(POLICIES)
+    assert rows["quick"]["solved"] == "100 % [76, 100]"
+    assert rows["quick"]["right answers"] == "12 of 12 (at least 75.8 %)"
+    assert rows["lost"]["probes, mean"] == "21.00 [21.00, 21.00]"
+    assert rows["lost"]["solved"] == "0 % [0, 24]"
+    assert rows["lost"]["right answers"] == "none ended"
+    beside = {row[0].strip("*"): row[1:] for row in compared[2:]}
+    # 2 of the 2^12 signs are as far, for each of three strategies.
+    assert beside["quick"][:3] == ["40 % [40, 40]", "−6.00 [−6.00, −6.00]", "0.001"]
+    assert beside["quick"][3:] == ["50 % [50, 50]", "−4.00 [−4.00, −4.00]", "0.001"]
+    assert beside["random"][:3] == ["", "", ""]
+    # After 4 probes and 8 contacts: of 10 probes 8 were left, of 8 six; quick had found it.
+    assert [row[1] for row in poses[2:]] == ["8 (8), 12", "6 (6), 12", "1 (1), 12", "18 (18), 12"]
+    assert [row[1] for row in decisions[2:]] == ["108", "84", "36", "228"]
+    assert "counts as 21" in page
+    assert "palpate benchmark --policies random,random-hit,quick,lost" in page
+    assert "seeds 0 to 11" in page
+    assert "palpate 0.1.0, python 3.11" in page
+    assert "12 episodes a strategy; 100 % of them were solved by some strategy. Floor: 2.00" in page
+
+
+def test_a_page_names_informed_strategies_that_are_worse_than_random_hits(tmp_path):
+    write_report(played(tmp_path), tmp_path / "page")
+    page = (tmp_path / "page.md").read_text()
+    # random is worse too, but asks for nothing.
+    assert re.findall(r"^- (\S+) on .*: \+13.00 .* probes, p 0.001$", page, re.MULTILINE) == [
+        "lost"
+    ]
+    config = small(policies=POLICIES[:3], episodes=12)
+    run_benchmark(config, tmp_path / "b", lambda job: made_up_row(job, probes=NEEDED[job.policy]))
+    write_report(tmp_path / "b", tmp_path / "better")
+    page = (tmp_path / "better.md").read_text()
+    assert "No informed strategy needs more probes than random-hit in any setting" in page
+
+
+def test_the_html_page_needs_nothing_else(tmp_path):
+    write_report(played(tmp_path), tmp_path / "page")
+    page = (tmp_path / "page.html").read_text()
+    assert page.count("<svg") == 3
+    assert not re.search(r"<(?:link|script|img|iframe)|url\((?!#)|@import|src=", page)
+    references = set(re.findall(r'href="([^"#][^"]*)"', page))
+    assert references == set()
+    for line in tables((tmp_path / "page.md").read_text())[1]:
+        assert line[0].strip("*") in ("---", *(set(re.findall(r"<t[dh]>(.*?)</t[dh]>", page))))
+
+
+def test_figures_lie_beside_the_page_under_the_names_it_says(tmp_path):
+    folder = played(tmp_path / "run", noise=("pi/8,0.05in", "pi/10,0.01in"))
+    beside = tmp_path / "to" / "be" / "made"
+    write_report(folder, beside / "results")
+    named = re.findall(r"\]\((.*?)\)", (beside / "results.md").read_text())
+    assert len(named) == 6
+    for name in named:
+        assert (beside / name).read_bytes().startswith(b"<?xml")
+        assert (beside / name).with_suffix(".pdf").read_bytes().startswith(b"%PDF")
+    assert sorted(p.name for p in folder.iterdir()) == [".lock", "config.json", "episodes.parquet"]
+
+
+def test_the_same_rows_make_the_same_page(tmp_path):
+    played(tmp_path)
+    pages = []
+    for name in ("once", "again"):
+        write_report(tmp_path, tmp_path / name)
+        pages.append((tmp_path / f"{name}.html").read_text())
+    assert pages[0] == pages[1]
+
+
+def test_episodes_that_some_strategy_hasnt_played_yet_arent_counted():
+    jobs = list(small(policies=("random", "quick")).jobs())
+    rows = [made_up_row(job, probes=4 + job.episode) for job in jobs]
+    slow_ones_missing = [r for r in rows if not (r.policy == "quick" and r.episode >= 3)]
+    result = settle(slow_ones_missing, ("random", "quick"), "simple-hand", "pi/8,0.05in")
+    assert result is not None
+    assert result.episodes == 3
+    assert [one.mean.value for one in result.policies] == [5.0, 5.0]
+    assert settle(rows[:1], ("random", "quick"), "simple-hand", "pi/8,0.05in") is None
+
+
+def test_curves_start_at_the_first_probe_and_stay_where_an_episode_ended():
+    jobs = [job for job in small().jobs() if job.policy == "random"][:2]
+    rows = [made_up_row(jobs[0], probes=2), made_up_row(jobs[1], probes=4)]
+    rows[1] = replace(rows[1], hypotheses=(0, 9, 3, 1))
+    result = settle(rows, ("random",), "simple-hand", "pi/8,0.05in")
+    assert result is not None
+    (one,) = result.policies
+    assert one.unsolved[:5].tolist() == [1.0, 0.5, 0.5, 0.0, 0.0]
+    # The second hadn't touched the object after its first probe.
+    assert one.left[:5].tolist() == [rows[0].hypotheses[0], 5.0, 2.0, 1.0, 1.0]
+
+
+def test_wrong_answers_and_beliefs_that_end_empty_are_told():
+    jobs = [job for job in small().jobs() if job.policy == "random"][:4]
+    rows = [made_up_row(job, probes=3) for job in jobs]
+    rows[1] = replace(rows[1], right=False)
+    rows[2] = replace(rows[2], ended="nothing fits", right=False)
+    result = settle(rows, ("random",), "simple-hand", "pi/8,0.05in")
+    assert result is not None
+    (one,) = result.policies
+    assert one.right is not None
+    assert (one.right.value, one.ended) == (0.5, 4)
+    assert one.mean.value == (3 + 3 + 21 + 3) / 4
+
+
+def test_poses_are_counted_after_seven_to_nine_contacts():
+    row = made_up_row(next(small().jobs()), probes=5)
+    assert poses_left(replace(row, contacts_felt=(3, 6, 9, 9, 12), hypotheses=(9, 8, 5, 3, 1))) == 5
+    assert poses_left(replace(row, contacts_felt=(1, 2, 3, 4, 5))) == 1
+    lost = replace(row, ended="gave up", contacts_felt=(1, 2, 3, 4, 5))
+    assert poses_left(lost) is None
+    assert poses_left(replace(row, contacts_felt=(3, 36, 39, 40, 41))) is None
+
+
+@pytest.mark.parametrize("made", ["nothing", "empty", "begun"])
+def test_a_folder_without_a_benchmark_is_refused(tmp_path, made):
+    folder = tmp_path / "run"
+    if made != "nothing":
+        folder.mkdir()
+    if made == "begun":
+        played(folder)
+        (folder / "episodes.parquet").unlink()
+        RowStore(folder).add(made_up_row(next(small(policies=POLICIES).jobs())))
+    says = "played by all strategies yet, 1 in all" if made == "begun" else "not the folder"
+    with pytest.raises(ValueError, match=f"run: .*{says}"):
+        write_report(folder, tmp_path / "page")
+    assert not list(tmp_path.glob("page*"))
+
+
+def test_thirteen_strategies_look_different_without_colour():
+    styles = style_of([f"strategy {number}" for number in range(11)] + ["random", "random-hit"])
+    looks = {(style["linestyle"], style["marker"]) for style in styles.values()}
+    assert len(looks) == 13
+
+
+def test_what_a_page_says_is_escaped():
+    blocks = [Heading("a < b & c", 1), Table(["<i>"], [["<script>"]]), Code("<pre>")]
+    page = html(blocks, "t")
+    assert "a &lt; b &amp; c" in page
+    assert "<script>" not in page
+    assert markdown(blocks, "") == "# a < b & c\n\n| <i> |\n| --- |\n| <script> |\n\n    <pre>\n"
