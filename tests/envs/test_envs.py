@@ -14,15 +14,15 @@ from gymnasium.utils.env_checker import check_env
 
 import palpate.envs
 from palpate.envs.probe_env import ProbeEnv
-from palpate.envs.scene.scene.placement import AcrossPlane
-from palpate.envs.scene.scene.scene import OBJECT, PLANE, ProbeScene
-from palpate.envs.sensors.sensors.noise import SensorNoise, uniform_in_ball, uniform_in_cone
-from palpate.envs.sensors.sensors.ray_sensor import RaySensor
-from palpate.envs.sensors.sensors.touch import ProbeCommand, triad
+from palpate.envs.scene.placement import AcrossPlane
+from palpate.envs.scene.scene import OBJECT, PLANE, ProbeScene
+from palpate.envs.sensors.noise import SensorNoise, uniform_in_ball, uniform_in_cone
+from palpate.envs.sensors.ray_sensor import RaySensor
+from palpate.envs.sensors.touch import ProbeCommand, triad
 from palpate.policies import make_policy
 from palpate.recognizer import Polyhedron, SearchLimits, pose_difference
 from palpate.recognizer.models.rays import cast_rays
-from palpate.scripts.commands.benchmark.playing import task_of
+from palpate.scripts.benchmark.playing import task_of
 
 gymnasium.register_envs(palpate.envs)
 

@@ -19,9 +19,9 @@ from gymnasium.wrappers import RecordEpisodeStatistics
 import palpate.envs
 from palpate.assets import mesh_path
 from palpate.envs import ENV_ID, FINGER_ENV_ID, PLANAR_ENV_ID, REST_ENV_ID
-from palpate.envs.collision.collision.collision import worked_out_parts
+from palpate.envs.collision.collision import worked_out_parts
 from palpate.envs.probe_env import ProbeEnv
-from palpate.envs.scene.scene.drop import DropScene
+from palpate.envs.scene.drop import DropScene
 from palpate.recognizer import Polyhedron, SearchLimits
 
 gymnasium.register_envs(palpate.envs)

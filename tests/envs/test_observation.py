@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from palpate.envs.probe_env import ProbeEnv
-from palpate.recognizer.predict.prediction.pose_samples import sample_belief
+from palpate.recognizer.predict.pose_samples import sample_belief
 
 SMALL = ("housing-34", "simple-hand")
 KEYS = {

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from palpate.scripts.commands.benchmark.config import BenchmarkConfig, Job
-from palpate.scripts.commands.benchmark.row import GAVE_UP, SOLVED, EpisodeRow
+from palpate.scripts.benchmark.config import BenchmarkConfig, Job
+from palpate.scripts.benchmark.row import GAVE_UP, SOLVED, EpisodeRow
 
 MOST = 20
 

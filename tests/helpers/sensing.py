@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from oracles import solids as oracles
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from palpate.envs.sensors.sensors.noise import uniform_in_ball, uniform_in_cone
+from palpate.envs.sensors.noise import uniform_in_ball, uniform_in_cone
 from palpate.recognizer import Contacts, Polyhedron
 from palpate.recognizer.models.features import Features
 from palpate.recognizer.models.rays import cast_rays

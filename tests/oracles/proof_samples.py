@@ -14,7 +14,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from palpate.envs.library import load_library
 from palpate.recognizer import Contacts, Polyhedron
-from palpate.recognizer.contacts.contacts.reading_kernels import carry, read
+from palpate.recognizer.contacts.reading_kernels import carry, read
 from palpate.recognizer.models.features import Features, all_features
 from palpate.recognizer.poses.fits.pose import KernelContacts, ModelTest, kernel_contacts
 from palpate.recognizer.poses.proofs.proof_kernels import workspace

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from palpate.assets import STAND_IN_NAMES, mesh_path
-from palpate.envs.sensors.sensors.noise import uniform_in_ball, uniform_in_cone
+from palpate.envs.sensors.noise import uniform_in_ball, uniform_in_cone
 from palpate.recognizer import Contacts, PairTables, Polyhedron
 
 Floats = NDArray[np.float64]

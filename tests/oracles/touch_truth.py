@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from oracles.checker import broken, check, corners_of, triangle_distances
 
-from palpate.envs.scene.scene.placement import AcrossPlane
-from palpate.envs.scene.scene.scene import ProbeScene
-from palpate.envs.sensors.sensors.touch import ProbeCommand, Sensor, Touch
+from palpate.envs.scene.placement import AcrossPlane
+from palpate.envs.scene.scene import ProbeScene
+from palpate.envs.sensors.touch import ProbeCommand, Sensor, Touch
 from palpate.recognizer import EDGE, FACE, VERTEX
 from palpate.recognizer.models.features import Features, all_features
 

@@ -15,38 +15,38 @@ from palpate.policies.grid import RAYS, SIDE
 from palpate.policies.information import gain_of_answers, gain_of_hypotheses
 from palpate.policies.lookahead import two_ahead
 from palpate.policies.minimax import TIE, UNLIKELY, worst_case
-from palpate.policies.outcomes.outcomes.candidates import aimed_actions, spread_actions
-from palpate.policies.outcomes.outcomes.outcomes import Outcomes
-from palpate.policies.outcomes.outcomes.paths import agreement
-from palpate.policies.outcomes.outcomes.pose_information import (
+from palpate.policies.outcomes.candidates import aimed_actions, spread_actions
+from palpate.policies.outcomes.outcomes import Outcomes
+from palpate.policies.outcomes.paths import agreement
+from palpate.policies.outcomes.pose_information import (
     PlacedModel,
     gain,
     gain_to_tolerance,
     known,
     rows_of,
 )
-from palpate.policies.outcomes.outcomes.rivals import (
+from palpate.policies.outcomes.rivals import (
     answers,
     leading_rows,
     same_answer,
     taken,
     thinned,
 )
-from palpate.policies.outcomes.outcomes.weighing import Budget
+from palpate.policies.outcomes.weighing import Budget
 from palpate.policies.pairs import pairs_told_apart
 from palpate.policies.pruning import weight_removed
 from palpate.policies.safe_region import safest_cell
 from palpate.policies.separation import separation
 from palpate.recognizer import Polyhedron, PoseTolerance, pose_difference
 from palpate.recognizer.models.rays import cast_rays
-from palpate.recognizer.predict.prediction.prediction import (
+from palpate.recognizer.predict.prediction import (
     MET_OBJECT,
     MET_PLANE,
     PoseSamples,
     Predictions,
     samples_of,
 )
-from palpate.recognizer.predict.prediction.probes import ProbeSpace
+from palpate.recognizer.predict.probes import ProbeSpace
 
 REACH, CONE = 1e-3, np.radians(20.0)
 SPACE = ProbeSpace(half_width=0.03, reach=0.16)

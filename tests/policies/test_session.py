@@ -19,9 +19,9 @@ from oracles.solids import (
 )
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from palpate.policies.outcomes.outcomes.outcomes import Outcomes
-from palpate.policies.outcomes.outcomes.reports import Purpose, Report, Suggestion, reports_of
-from palpate.policies.outcomes.outcomes.task import Task
+from palpate.policies.outcomes.outcomes import Outcomes
+from palpate.policies.outcomes.reports import Purpose, Report, Suggestion, reports_of
+from palpate.policies.outcomes.task import Task
 from palpate.policies.ranking import FORMULAS
 from palpate.policies.session import Session
 from palpate.policies.straight import AXES, Reach, Region
@@ -34,8 +34,8 @@ from palpate.recognizer import (
     SupportPlane,
     pose_difference,
 )
-from palpate.recognizer.predict.prediction.prediction import MET_OBJECT, Predictions, samples_of
-from palpate.recognizer.predict.prediction.probes import ProbeSpace, TriadRays
+from palpate.recognizer.predict.prediction import MET_OBJECT, Predictions, samples_of
+from palpate.recognizer.predict.probes import ProbeSpace, TriadRays
 
 LIBRARY = [model("l-block"), model("tetrahedron"), Polyhedron.from_mesh(box(1, 2, 3), name="box")]
 REACH, CONE = 0.01, 0.3

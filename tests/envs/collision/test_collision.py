@@ -16,17 +16,17 @@ from oracles import solids as oracles
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from palpate.assets import STAND_IN_NAMES, ConvexPart, load_parts
-from palpate.envs.collision.collision import collision, convex_cuts
-from palpate.envs.collision.collision.collision import (
+from palpate.envs.collision import collision, convex_cuts
+from palpate.envs.collision.collision import (
     MOST_STRAY,
     CollisionParts,
     collision_parts,
     parts_key,
     worked_out_parts,
 )
-from palpate.envs.collision.collision.convex_cells import Cell, Plane, split_polygon
-from palpate.envs.collision.collision.hull import Hull
-from palpate.envs.collision.collision.parts_check import stray
+from palpate.envs.collision.convex_cells import Cell, Plane, split_polygon
+from palpate.envs.collision.hull import Hull
+from palpate.envs.collision.parts_check import stray
 from palpate.recognizer import Polyhedron
 from palpate.recognizer.models.rays import cast_rays
 from palpate.recognizer.tables import file_cache

@@ -24,8 +24,8 @@ from palpate.envs.planar.picture import PlanarPicture, draw_planar
 from palpate.envs.planar.planar_env import PlanarProbeEnv
 from palpate.envs.planar.probe import PlanarProbe
 from palpate.envs.planar.rays import cast_planar_rays
-from palpate.envs.scene.scene.scene import NOTHING, OBJECT
-from palpate.envs.sensors.sensors.noise import SensorNoise
+from palpate.envs.scene.scene import NOTHING, OBJECT
+from palpate.envs.sensors.noise import SensorNoise
 from palpate.recognizer import Polygon
 
 gymnasium.register_envs(palpate.envs)

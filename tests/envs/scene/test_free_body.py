@@ -9,9 +9,9 @@ import pytest
 from oracles import solids as oracles
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from palpate.envs.scene.scene.free_body import Displacement, displacement, grown, grown_free_space
+from palpate.envs.scene.free_body import Displacement, displacement, grown, grown_free_space
 from palpate.recognizer import Contacts, FreeSpace
-from palpate.recognizer.contacts.contacts.contacts import APPROACH_ERROR
+from palpate.recognizer.contacts.contacts import APPROACH_ERROR
 
 MODELS = ("cube", "l-block", "housing")
 

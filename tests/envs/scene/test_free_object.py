@@ -16,16 +16,16 @@ from scipy.spatial.transform import RigidTransform, Rotation
 import palpate.envs
 from palpate.assets import STAND_IN_NAMES
 from palpate.envs.probe_env import ProbeEnv
-from palpate.envs.scene.scene.finger import FingerDesign
-from palpate.envs.scene.scene.free_body import STILL, displacement
-from palpate.envs.scene.scene.free_object import SINK, FreeObject
-from palpate.envs.scene.scene.placement import Resting
-from palpate.envs.scene.scene.scene import ProbeScene
-from palpate.envs.sensors.sensors.evidence import Evidence
-from palpate.envs.sensors.sensors.finger_sensor import FingerSensor
-from palpate.envs.sensors.sensors.noise import SensorNoise
-from palpate.envs.sensors.sensors.ray_sensor import RaySensor
-from palpate.envs.sensors.sensors.touch import ProbeCommand, Touch
+from palpate.envs.scene.finger import FingerDesign
+from palpate.envs.scene.free_body import STILL, displacement
+from palpate.envs.scene.free_object import SINK, FreeObject
+from palpate.envs.scene.placement import Resting
+from palpate.envs.scene.scene import ProbeScene
+from palpate.envs.sensors.evidence import Evidence
+from palpate.envs.sensors.finger_sensor import FingerSensor
+from palpate.envs.sensors.noise import SensorNoise
+from palpate.envs.sensors.ray_sensor import RaySensor
+from palpate.envs.sensors.touch import ProbeCommand, Touch
 from palpate.recognizer import Polyhedron, SearchLimits
 from palpate.recognizer.models.features import all_features
 

@@ -12,13 +12,13 @@ from oracles import solids as oracles
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from palpate.assets import STAND_IN_NAMES
-from palpate.envs.collision.collision.collision import worked_out_parts
-from palpate.envs.collision.collision.mass import mass_properties, volume
-from palpate.envs.scene.scene.drop import MOST_TILT, DropScene, onto_plane
-from palpate.envs.scene.scene.placement import AcrossPlane, Resting
-from palpate.envs.scene.scene.resting_faces import resting_faces
+from palpate.envs.collision.collision import worked_out_parts
+from palpate.envs.collision.mass import mass_properties, volume
+from palpate.envs.scene.drop import MOST_TILT, DropScene, onto_plane
+from palpate.envs.scene.placement import AcrossPlane, Resting
+from palpate.envs.scene.resting_faces import resting_faces
 from palpate.recognizer import Polyhedron, SupportPlane
-from palpate.recognizer.contacts.contacts.support import StableFace, stable_faces
+from palpate.recognizer.contacts.support import StableFace, stable_faces
 
 SOLIDS = ("cube", "tetrahedron", "l-block", "holed", "bridge", "hull-20")
 

@@ -10,12 +10,12 @@ from oracles.touch_truth import faults, touches_around
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from palpate.assets import STAND_IN_NAMES, ConvexPart
-from palpate.envs.collision.collision.collision import CollisionParts, collision_parts
-from palpate.envs.scene.scene.placement import AcrossPlane
-from palpate.envs.scene.scene.scene import NOTHING, OBJECT, PLANE, ProbeScene
-from palpate.envs.sensors.sensors.ball_sensor import BallSensor
-from palpate.envs.sensors.sensors.noise import SensorNoise
-from palpate.envs.sensors.sensors.touch import ProbeCommand, triad
+from palpate.envs.collision.collision import CollisionParts, collision_parts
+from palpate.envs.scene.placement import AcrossPlane
+from palpate.envs.scene.scene import NOTHING, OBJECT, PLANE, ProbeScene
+from palpate.envs.sensors.ball_sensor import BallSensor
+from palpate.envs.sensors.noise import SensorNoise
+from palpate.envs.sensors.touch import ProbeCommand, triad
 from palpate.recognizer import EDGE, FACE, VERTEX, Polyhedron
 from palpate.recognizer.models.features import all_features
 from palpate.scripts.lab.bench.touch_cases import KINDS, ApproachSampler, depth_in_hull

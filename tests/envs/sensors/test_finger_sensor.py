@@ -11,16 +11,16 @@ from oracles.touch_truth import faults, touches_around
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from palpate.assets import STAND_IN_NAMES, ConvexPart
-from palpate.envs.collision.collision.collision import CollisionParts
-from palpate.envs.scene.scene.finger import Finger, FingerDesign
-from palpate.envs.scene.scene.placement import AcrossPlane
-from palpate.envs.scene.scene.scene import NOTHING, OBJECT, PLANE, ProbeScene
-from palpate.envs.sensors.sensors import guarded_move
-from palpate.envs.sensors.sensors.ball_sweep import BallSweep
-from palpate.envs.sensors.sensors.finger_sensor import FingerSensor
-from palpate.envs.sensors.sensors.guarded_move import GuardedMove
-from palpate.envs.sensors.sensors.noise import SensorNoise
-from palpate.envs.sensors.sensors.touch import ProbeCommand, triad
+from palpate.envs.collision.collision import CollisionParts
+from palpate.envs.scene.finger import Finger, FingerDesign
+from palpate.envs.scene.placement import AcrossPlane
+from palpate.envs.scene.scene import NOTHING, OBJECT, PLANE, ProbeScene
+from palpate.envs.sensors import guarded_move
+from palpate.envs.sensors.ball_sweep import BallSweep
+from palpate.envs.sensors.finger_sensor import FingerSensor
+from palpate.envs.sensors.guarded_move import GuardedMove
+from palpate.envs.sensors.noise import SensorNoise
+from palpate.envs.sensors.touch import ProbeCommand, triad
 from palpate.recognizer import EDGE, FACE, VERTEX, Polyhedron
 from palpate.recognizer.models.features import all_features
 from palpate.scripts.lab.bench.touch_cases import KINDS, ApproachSampler

@@ -9,9 +9,9 @@ from gymnasium.utils.env_checker import check_env
 
 import palpate.envs
 from palpate.envs.probe_env import ProbeEnv
-from palpate.envs.scene.scene.scene import OBJECT
-from palpate.envs.sensors.sensors.noise import SensorNoise
-from palpate.envs.sensors.sensors.ray_sensor import RaySensor
+from palpate.envs.scene.scene import OBJECT
+from palpate.envs.sensors.noise import SensorNoise
+from palpate.envs.sensors.ray_sensor import RaySensor
 from palpate.recognizer import EDGE, FACE, VERTEX, SearchLimits, pose_difference
 
 gymnasium.register_envs(palpate.envs)

@@ -16,11 +16,11 @@ from scipy.optimize import linprog
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from palpate.assets import STAND_IN_NAMES
-from palpate.envs.scene.scene.placement import AcrossPlane
-from palpate.envs.scene.scene.scene import OBJECT, PLANE, ProbeScene
-from palpate.envs.sensors.sensors.noise import SensorNoise
-from palpate.envs.sensors.sensors.patch_bounds import GRID, MIDDLE, normal_bound, possible_slopes
-from palpate.envs.sensors.sensors.patches import (
+from palpate.envs.scene.placement import AcrossPlane
+from palpate.envs.scene.scene import OBJECT, PLANE, ProbeScene
+from palpate.envs.sensors.noise import SensorNoise
+from palpate.envs.sensors.patch_bounds import GRID, MIDDLE, normal_bound, possible_slopes
+from palpate.envs.sensors.patches import (
     ARM,
     SIDE,
     best_of_blocks,
@@ -28,15 +28,15 @@ from palpate.envs.sensors.sensors.patches import (
     patch_residuals,
     spread_out,
 )
-from palpate.envs.sensors.sensors.range_image import RangeView, bounded_noise
-from palpate.envs.sensors.sensors.range_points import FLAT
-from palpate.envs.sensors.sensors.range_sensor import (
+from palpate.envs.sensors.range_image import RangeView, bounded_noise
+from palpate.envs.sensors.range_points import FLAT
+from palpate.envs.sensors.range_sensor import (
     COARSEST,
     SHORTEST_EDGE,
     RangeGrid,
     RangeScanner,
 )
-from palpate.envs.sensors.sensors.touch import ProbeCommand, Sensor, Touch
+from palpate.envs.sensors.touch import ProbeCommand, Sensor, Touch
 from palpate.recognizer import FACE, Polyhedron, Recognizer
 from palpate.recognizer.models.rays import cast_rays
 

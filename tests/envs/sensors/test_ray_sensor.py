@@ -9,12 +9,12 @@ from oracles.solids import box, model
 from oracles.touch_truth import faults, touches_around
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from palpate.envs.scene.scene.placement import AcrossPlane
-from palpate.envs.scene.scene.scene import NORMAL_ROUNDING, OBJECT, ProbeScene
-from palpate.envs.sensors.sensors.noise import SensorNoise, uniform_in_ball, uniform_in_cone
-from palpate.envs.sensors.sensors.ray_sensor import RaySensor
-from palpate.envs.sensors.sensors.sensors import make_sensor
-from palpate.envs.sensors.sensors.touch import ProbeCommand, triad
+from palpate.envs.scene.placement import AcrossPlane
+from palpate.envs.scene.scene import NORMAL_ROUNDING, OBJECT, ProbeScene
+from palpate.envs.sensors.noise import SensorNoise, uniform_in_ball, uniform_in_cone
+from palpate.envs.sensors.ray_sensor import RaySensor
+from palpate.envs.sensors.sensors import make_sensor
+from palpate.envs.sensors.touch import ProbeCommand, triad
 from palpate.recognizer import FACE, Polyhedron
 from palpate.recognizer.models.rays import cast_rays
 

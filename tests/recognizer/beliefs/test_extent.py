@@ -205,8 +205,8 @@ def _wander(kernel_model, model, pose, faces, contacts, rng):
 @pytest.mark.parametrize("seed", [2016, 2030])
 def test_episodes_that_once_ended_with_a_pose_too_far_off_end_with_a_right_one(seed):
     from palpate.policies import make_policy
-    from palpate.scripts.commands.benchmark.config import BenchmarkConfig
-    from palpate.scripts.commands.benchmark.playing import make_env, open_episode, play, task_of
+    from palpate.scripts.benchmark.config import BenchmarkConfig
+    from palpate.scripts.benchmark.playing import make_env, open_episode, play, task_of
 
     config = BenchmarkConfig(
         policies=("information" if seed == 2016 else "minimax",),

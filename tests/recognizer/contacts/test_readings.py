@@ -13,7 +13,7 @@ from oracles.proof_samples import direction, draw, read_at, start_near
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from palpate.recognizer import Contacts
-from palpate.recognizer.contacts.contacts.reading_kernels import (
+from palpate.recognizer.contacts.reading_kernels import (
     ARC,
     CONE_END,
     NO_CONE,

@@ -15,7 +15,7 @@ from scipy.spatial import ConvexHull
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from palpate.recognizer import Contacts, Polyhedron, SupportPlane
-from palpate.recognizer.contacts.contacts.support import (
+from palpate.recognizer.contacts.support import (
     FOOTING,
     StableFace,
     hull_corners,

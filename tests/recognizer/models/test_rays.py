@@ -8,7 +8,7 @@ from oracles.solids import SOLIDS, first_hit, model, random_pose
 from scipy.spatial.transform import RigidTransform
 
 from palpate.assets import STAND_IN_NAMES
-from palpate.envs.scene.scene.scene import OBJECT, ProbeScene
+from palpate.envs.scene.scene import OBJECT, ProbeScene
 from palpate.recognizer.models.rays import cast_rays
 
 every_stand_in = pytest.mark.parametrize("name", STAND_IN_NAMES)

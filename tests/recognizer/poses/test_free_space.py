@@ -21,7 +21,7 @@ from oracles.checker import (
 )
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from palpate.envs.sensors.sensors.noise import uniform_in_ball, uniform_in_cone
+from palpate.envs.sensors.noise import uniform_in_ball, uniform_in_cone
 from palpate.recognizer import (
     Belief,
     Contacts,
@@ -32,7 +32,7 @@ from palpate.recognizer import (
     Recognizer,
     SupportPlane,
 )
-from palpate.recognizer.contacts.contacts.support import stable_faces
+from palpate.recognizer.contacts.support import stable_faces
 
 Floats = NDArray[np.float64]
 

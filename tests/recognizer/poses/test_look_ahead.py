@@ -20,7 +20,7 @@ from oracles.proof_samples import direction
 from scipy.spatial.transform import Rotation
 
 from palpate.recognizer import Contacts, PairTables
-from palpate.recognizer.contacts.contacts.reading_kernels import RAY
+from palpate.recognizer.contacts.reading_kernels import RAY
 from palpate.recognizer.models.features import all_features
 from palpate.recognizer.poses.fits.pose import ModelTest, kernel_contacts
 from palpate.recognizer.poses.fits.pose_kernels import start_pose
@@ -39,9 +39,9 @@ from palpate.recognizer.poses.search.branch_kernels import INNER_STEPS
 from palpate.recognizer.poses.search.look_ahead_kernels import drop_beyond_region, drop_rejected
 from palpate.recognizer.poses.search.search_kernels import VAGUE
 from palpate.recognizer.tables.ranges import pack_tables
-from palpate.recognizer.tree.tree.forward_kernels import check_forward, take_lowest
-from palpate.recognizer.tree.tree.mask_kernels import pair_readings
-from palpate.recognizer.tree.tree.tree import Constraints
+from palpate.recognizer.tree.forward_kernels import check_forward, take_lowest
+from palpate.recognizer.tree.mask_kernels import pair_readings
+from palpate.recognizer.tree.tree import Constraints
 
 Bools = NDArray[np.bool_]
 Floats = NDArray[np.float64]

@@ -34,7 +34,7 @@ from palpate.recognizer.poses.fits.fit_kernels import fit_pose
 from palpate.recognizer.poses.fits.pose import ModelTest, Poses, kernel_contacts
 from palpate.recognizer.poses.fits.pose_kernels import finish, weigh
 from palpate.recognizer.poses.proofs.proof_kernels import workspace
-from palpate.recognizer.tree.tree.tree import prune
+from palpate.recognizer.tree.tree import prune
 
 ROWS = ((np.pi / 12, 0.01), (np.pi / 10, 0.01), (np.pi / 8, 0.05), (np.pi / 8, 0.1))
 """Bounds on normals (radians) and positions (inches)."""

@@ -28,7 +28,7 @@ from oracles.proof_samples import (
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from palpate.recognizer import Contacts
-from palpate.recognizer.contacts.contacts.reading_kernels import meets_all, worst_on_pieces
+from palpate.recognizer.contacts.reading_kernels import meets_all, worst_on_pieces
 from palpate.recognizer.models.features import all_features
 from palpate.recognizer.poses.fits.feasibility_kernels import seek_feasible
 from palpate.recognizer.poses.fits.pose import ModelTest, Poses

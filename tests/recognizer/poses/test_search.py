@@ -22,8 +22,8 @@ from palpate.recognizer.poses.proofs.possible_kernels import possible
 from palpate.recognizer.poses.proofs.proof_kernels import locate, workspace
 from palpate.recognizer.poses.proofs.region_kernels import square_root
 from palpate.recognizer.tables.ranges import pack_tables
-from palpate.recognizer.tree.tree.mask_kernels import narrow, pair_readings
-from palpate.recognizer.tree.tree.tree import Constraints, prune
+from palpate.recognizer.tree.mask_kernels import narrow, pair_readings
+from palpate.recognizer.tree.tree import Constraints, prune
 
 Floats = NDArray[np.float64]
 ROWS = ((np.pi / 12, 0.01), (np.pi / 10, 0.01), (np.pi / 8, 0.05), (np.pi / 8, 0.1))

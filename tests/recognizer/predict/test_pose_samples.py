@@ -9,8 +9,8 @@ from oracles.solids import model, random_contacts, random_pose
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from palpate.recognizer import Belief, Contacts, Recognizer, SupportPlane
-from palpate.recognizer.predict.prediction.pose_samples import MOST_OF_ONE, sample_belief
-from palpate.recognizer.predict.prediction.prediction import PoseSamples
+from palpate.recognizer.predict.pose_samples import MOST_OF_ONE, sample_belief
+from palpate.recognizer.predict.prediction import PoseSamples
 
 NAMES = ("l-block", "tetrahedron")
 LIBRARY = [model(name) for name in NAMES]

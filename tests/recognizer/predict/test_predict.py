@@ -10,14 +10,14 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from palpate.assets import STAND_IN_NAMES
 from palpate.recognizer import Polyhedron
 from palpate.recognizer.models.rays import cast_rays
-from palpate.recognizer.predict.prediction.prediction import (
+from palpate.recognizer.predict.prediction import (
     MET_OBJECT,
     MET_PLANE,
     PoseSamples,
     Predictions,
     predict,
 )
-from palpate.recognizer.predict.prediction.probes import ProbeSpace, TriadRays
+from palpate.recognizer.predict.probes import ProbeSpace, TriadRays
 
 
 def plain_predictions(samples: PoseSamples, rays: TriadRays) -> Predictions:

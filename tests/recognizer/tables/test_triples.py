@@ -25,7 +25,7 @@ from oracles.solids import (
 )
 
 from palpate.assets import STAND_IN_NAMES
-from palpate.envs.sensors.sensors.noise import uniform_in_ball
+from palpate.envs.sensors.noise import uniform_in_ball
 from palpate.recognizer import Constraints, Contacts, PairTables, Polyhedron
 from palpate.recognizer.models.features import all_features
 from palpate.recognizer.models.polygon import Polygon
@@ -38,7 +38,7 @@ from palpate.recognizer.tables.triple_range_kernels import (
     direction_cones,
 )
 from palpate.recognizer.tables.triples import TripleTables
-from palpate.recognizer.tree.tree.tree import InterpretationTree, prune, root
+from palpate.recognizer.tree.tree import InterpretationTree, prune, root
 
 MODELS = (*SOLIDS, *STAND_IN_NAMES)
 NO_NORMALS = {"angle": False, "component": False}

@@ -7,9 +7,9 @@ from scipy.spatial.transform import Rotation
 
 from palpate.recognizer import Contacts, Recognizer
 from palpate.recognizer.poses.fits.pose import kernel_contacts
-from palpate.recognizer.tree.tree.cell_search_kernels import passing_cells
-from palpate.recognizer.tree.tree.mask_kernels import pair_readings
-from palpate.recognizer.tree.tree.room_kernels import DIRECTIONS, enter, feature_slabs, view_ways
+from palpate.recognizer.tree.cell_search_kernels import passing_cells
+from palpate.recognizer.tree.mask_kernels import pair_readings
+from palpate.recognizer.tree.room_kernels import DIRECTIONS, enter, feature_slabs, view_ways
 
 FINEST = 0.2
 MOST = 200_000

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from palpate.recognizer.tree.tree.leaf_kernels import place_of, table_of
+from palpate.recognizer.tree.leaf_kernels import place_of, table_of
 
 
 def test_a_row_is_found_at_its_place_and_no_other_row_is() -> None:

@@ -22,8 +22,8 @@ from scipy.spatial.transform import Rotation
 from palpate.assets import STAND_IN_NAMES
 from palpate.recognizer import Constraints, Contacts
 from palpate.recognizer.models.rays import cast_rays
-from palpate.recognizer.tree.tree.tree import InterpretationTree, far_apart_order, prune, root
-from palpate.recognizer.tree.tree.tree_kernels import pair_masks
+from palpate.recognizer.tree.tree import InterpretationTree, far_apart_order, prune, root
+from palpate.recognizer.tree.tree_kernels import pair_masks
 
 NAMES = ("distance", "angle", "component", "tilt")
 ALL = Constraints(distance=True, angle=True, component=True, tilt=True)

@@ -10,9 +10,9 @@ import numpy as np
 from oracles.solids import model, tables
 
 from palpate.envs.probe_env import INCH
-from palpate.envs.sensors.sensors.noise import SensorNoise
+from palpate.envs.sensors.noise import SensorNoise
 from palpate.recognizer import Belief, Recognizer, pose_difference
-from palpate.recognizer.tree.tree.tree import prune
+from palpate.recognizer.tree.tree import prune
 from palpate.scripts.lab.bench import accuracy as bench_accuracy
 from palpate.scripts.lab.bench import icp as bench_icp
 from palpate.scripts.lab.bench import limit as bench_limit

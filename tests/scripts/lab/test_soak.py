@@ -13,7 +13,7 @@ import typer
 
 from palpate.envs.planar.planar_env import PlanarProbeEnv
 from palpate.envs.probe_env import ProbeEnv
-from palpate.envs.scene.scene.scene import OBJECT, PLANE
+from palpate.envs.scene.scene import OBJECT, PLANE
 from palpate.recognizer import FreeSpace
 from palpate.scripts.lab.soak import run as soak_run
 from palpate.scripts.lab.soak.__main__ import MOST_GROWTH, failures, soak

@@ -18,7 +18,7 @@ from helpers.sensing import INCH, feel, sense_grid
 from scipy.spatial.transform import RigidTransform
 
 from palpate.assets import mesh_path
-from palpate.envs.sensors.sensors.sensors import SENSOR_NAMES
+from palpate.envs.sensors.sensors import SENSOR_NAMES
 from palpate.recognizer import (
     VERTEX,
     Belief,
@@ -29,7 +29,7 @@ from palpate.recognizer import (
     SupportPlane,
 )
 from palpate.recognizer.poses.fits.pose import ModelTest
-from palpate.recognizer.tree.tree.tree import prune
+from palpate.recognizer.tree.tree import prune
 from palpate.scripts.lab.soundness import __main__ as soundness
 from palpate.scripts.lab.soundness.case import Case
 from palpate.scripts.lab.soundness.cases import KINDS, draw_case, draw_kind
