@@ -375,7 +375,7 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
             )
         else:
             paths = touch.free_space if self.use_free_space else None
-            self._belief = before.update(touch.contacts, free_space=paths)
+            self._belief = self.recognizer.update(before, touch.contacts, free_space=paths)
         self._samples = sample_belief(self._belief, self.library, self._layout.samples)
 
     def _show(self) -> None:

@@ -100,7 +100,7 @@ def ranked_touches(
         count: how many, at most.
         rng: source of the touches thought of.
     """
-    models = belief.recognizer.models
+    models = belief.library.models
     everything = _within_what_is_known(sample_belief(belief, models, SHOWN), belief)
     if not len(everything):
         return ()
@@ -162,16 +162,16 @@ def ranked_touches(
 
 def _task(belief: Belief, region: Region) -> Task:
     """The session as strategies know one, with the median bounds of the contacts so far."""
-    contacts, recognizer = belief.contacts, belief.recognizer
+    contacts = belief.contacts
     felt = contacts.normal_error[contacts.normal_error < np.pi]
     return Task(
-        library=recognizer.models,
+        library=belief.library.models,
         # Of triads, which nobody sends here.
         space=ProbeSpace(half_width=0.5 * region.diagonal, reach=region.diagonal),
         position_error=float(np.median(contacts.position_error)),
         normal_error=float(np.median(felt)) if len(felt) else np.pi,
         free_space=True,
-        tolerance=recognizer.tolerance,
+        tolerance=belief.tolerance,
     )
 
 

@@ -98,7 +98,7 @@ class Session:
         contacts = Contacts.none() if contacts is None else contacts
         ways = FreeSpace.none() if free_space is None else free_space
         if self._belief is not None:
-            self._belief = self._belief.update(contacts, free_space=ways)
+            self._belief = self.recognizer.update(self._belief, contacts, free_space=ways)
         elif len(contacts):
             self._belief = self.recognizer.recognize(
                 contacts,

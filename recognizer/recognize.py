@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from copy import copy
 from pathlib import Path
 from typing import Literal
 
@@ -11,11 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
-from .belief import Belief, Search
+from .belief import Belief
 from .beliefs.extent import pin_down
 from .beliefs.hypotheses import Hypothesis, PoseTolerance
+from .beliefs.library import Library
 from .beliefs.outline import PlanarEntry, search_polygon, span_polygon
-from .beliefs.solid import SolidEntry, search_solid, span_solid
+from .beliefs.search import Search
+from .beliefs.solid import search_solid, span_solid
 from .contacts.contacts import EDGE, Contacts
 from .contacts.free_space import FreeSpace
 from .contacts.support import SupportPlane
@@ -24,33 +26,11 @@ from .models.polygon import Polygon
 from .models.polyhedron import Polyhedron
 from .poses.surroundings.surroundings import Surroundings
 from .tables.ranges import PairTables
+from .tree.limits import SearchLimits
 from .tree.tree import Constraints, spread_order
 from .tree.tree_kernels import least_span
 
 Found = tuple[list[Hypothesis], NDArray[np.float64], Search]
-
-
-@dataclass(frozen=True, kw_only=True)
-class SearchLimits:
-    """How the tree is grown, and when it is cut short."""
-
-    budget: int = 100_000
-    """The most interpretations of one model; more, and the belief says that it is not complete."""
-    nodes: int = 20_000_000
-    """The most branches of one model's tree; likewise."""
-    crowd: int = 16
-    """Completions of a branch from which the pose is asked for within the tree."""
-    first_stage: int = 4
-    """In the plane: levels grown before the first model test."""
-    stage: int = 4
-    """In the plane: levels grown between two model tests, while interpretations are few."""
-    flood: int = 2000
-    """In the plane: interpretations at which a stage is grown a level at a time instead."""
-
-    def __post_init__(self) -> None:
-        for name in ("budget", "nodes", "crowd", "first_stage", "stage", "flood"):
-            if getattr(self, name) < 1:
-                raise ValueError(f"{name} is {getattr(self, name)}; it must be at least 1")
 
 
 class Recognizer:
@@ -75,45 +55,30 @@ class Recognizer:
             models: the library, solids or outlines; names must differ.
             features: what of a solid a contact may lie on: its faces, or "all" for its convex edges
                 and vertices too, which a finger with a ball tip meets.
-            constraints: which constraints prune the tree; those on triples are for `tree.prune`.
+            constraints: which constraints on pairs prune the tree.
             tolerance: which poses count as the same.
             limits: how far the search goes.
             cache: a folder to keep range tables in between runs, by content.
 
         Raises:
             ValueError: no model at all, two of the same name, solids and outlines together, edges
-                and vertices of outlines.
+                and vertices of outlines; constraints on triples, which are for `prune`.
         """
-        everything = tuple(models)
-        if not everything:
-            raise ValueError("a recogniser needs at least one model; the library is empty")
-        names = [model.name for model in everything]
-        twice = sorted({name for name in names if names.count(name) > 1})
-        if twice:
-            raise ValueError(f"two models are called {twice[0]!r}; names must differ")
         if features not in ("faces", "all"):
             raise ValueError(f"features is {features!r}; it must be 'faces' or 'all'")
-        solids = tuple(model for model in everything if isinstance(model, Polyhedron))
-        outlines = tuple(model for model in everything if isinstance(model, Polygon))
-        if solids and outlines:
-            raise ValueError(
-                f"{solids[0].name!r} is a solid and {outlines[0].name!r} an outline of the plane;"
-                " a library has one kind"
-            )
-        if outlines and features == "all":
-            raise ValueError("features 'all' is for solids; outlines have edges alone")
-        self._edges = features == "all"
-        self.models = solids
-        self.outlines = outlines
-        self.dimension = 3 if solids else 2
         self.constraints = constraints or Constraints()
+        if self.constraints.triple or self.constraints.area:
+            raise ValueError(
+                "the constraints triple and area are for `prune`; a recogniser's own test of poses"
+                " says more than they do"
+            )
+        self.library = Library.of(models, edges=features == "all", cache=cache)
+        self.models = self.library.models
+        self.outlines = tuple(entry.model for entry in self.library.outlines)
+        self.dimension = self.library.dimension
         self.tolerance = tolerance or PoseTolerance()
         self.limits = limits or SearchLimits()
-        self._solids = tuple(
-            SolidEntry.of(model, edges=self._edges, folder=cache) for model in solids
-        )
-        self._outlines = tuple(PlanarEntry.of(model) for model in outlines)
-        self._spans = np.array([model.diameter for model in solids])
+        self._spans = np.array([model.diameter for model in self.models])
 
     def tables(self, name: str) -> PairTables:
         """The range tables of a solid.
@@ -121,7 +86,7 @@ class Recognizer:
         Raises:
             ValueError: no solid of that name.
         """
-        return self.solid(name).tables
+        return self.library.solid(name).tables
 
     def features(self, name: str) -> Features:
         """What of a solid contacts may lie on; interpretations are rows of its indices.
@@ -129,7 +94,7 @@ class Recognizer:
         Raises:
             ValueError: no solid of that name.
         """
-        return self.solid(name).features
+        return self.library.solid(name).features
 
     def sample_poses(
         self, hypothesis: Hypothesis, contacts: Contacts, most: int = 256
@@ -147,28 +112,16 @@ class Recognizer:
         Returns:
             A stack of poses, model to world, the hypothesis's own first.
         """
-        entry = self._entry(hypothesis.object_name)
+        entry = self.library.entry(hypothesis.object_name)
         if isinstance(entry, PlanarEntry):
             return span_polygon(entry, hypothesis, contacts, self.tolerance, most)
         return span_solid(entry, hypothesis, contacts, self.tolerance, most)
 
-    def solid(self, name: str) -> SolidEntry:
-        """A solid with all that was built of it.
-
-        Raises:
-            ValueError: no solid of that name.
-        """
-        entry = self._entry(name)
-        if isinstance(entry, PlanarEntry):
-            raise ValueError(f"{name!r} is an outline; it has edges alone, and planar tables")
-        return entry
-
-    def _entry(self, name: str) -> SolidEntry | PlanarEntry:
-        for entry in (*self._solids, *self._outlines):
-            if entry.model.name == name:
-                return entry
-        known = ", ".join(entry.model.name for entry in (*self._solids, *self._outlines))
-        raise ValueError(f"no model is called {name!r}; there are: {known}")
+    def limited(self, limits: SearchLimits) -> Recognizer:
+        """The same with other limits; nothing is built again."""
+        other = copy(self)
+        other.limits = limits
+        return other
 
     def recognize(
         self,
@@ -203,11 +156,23 @@ class Recognizer:
         known = Surroundings.of(free_space, support)
         return self._believe(contacts, spread_order(contacts), outliers, known, None)
 
-    def extend(
+    def update(
         self, belief: Belief, contacts: Contacts, *, free_space: FreeSpace | None = None
     ) -> Belief:
-        """The belief after further contacts; see `Belief.update`."""
+        """The belief after further contacts: the same as of all of them from the start.
+
+        Args:
+            belief: of a recogniser with the same library.
+            contacts: the new ones; there may be none.
+            free_space: further paths that the probe swept.
+
+        Raises:
+            ValueError: contacts of the plane for a library in space, or the other way round; a
+                belief about another library.
+        """
         self._check(contacts, belief.outliers)
+        if not self.library.alike(belief.library):
+            raise ValueError("this belief is about another library than the recogniser's")
         first = len(belief.contacts)
         everything = Contacts.join([belief.contacts, contacts])
         if self.dimension == 2:
@@ -229,7 +194,7 @@ class Recognizer:
                 f"contacts have {contacts.dimension} coordinates, but the library is of"
                 f" {kind}: give {self.dimension}"
             )
-        if not self._edges and (contacts.kinds >= EDGE).any():
+        if not self.library.edges and (contacts.kinds >= EDGE).any():
             sharp = int(np.argmax(contacts.kinds >= EDGE))
             raise ValueError(
                 f"contact {sharp} is on an edge or a vertex, but this recogniser knows faces"
@@ -253,10 +218,10 @@ class Recognizer:
         span = least_span(ordered.positions, ordered.position_error) if outliers == 0 else 0.0
         hypotheses: list[Hypothesis] = []
         logs, searches = [], []
-        for entry in self._outlines:
+        for entry in self.library.outlines:
             found = search_polygon(entry, ordered, self.constraints, self.tolerance, self.limits)
             _note(found, hypotheses, logs, searches)
-        for entry, diameter in zip(self._solids, self._spans, strict=False):
+        for entry, diameter in zip(self.library.solids, self._spans, strict=False):
             # Memo, Section 7: no two contacts are farther apart than the object is wide.
             if span > diameter * (1.0 + 1e-9):
                 searches.append(Search.none(entry.model.name, len(contacts)))
@@ -280,13 +245,14 @@ class Recognizer:
             hypotheses[index].ranked(float(weights[index]), back)
             for index in np.lexsort((-weights, nulls))
         ]
-        if len(ranked) == 1 and ranked[0].determined and self._solids:
+        if len(ranked) == 1 and ranked[0].determined and self.models:
             ranked = [self._pinned(ranked[0], contacts, known)]
         return Belief(
             tuple(ranked),
             tuple(searches),
             contacts,
-            self,
+            self.library,
+            self.tolerance,
             outliers,
             known.free_space,
             known.support,
@@ -294,7 +260,7 @@ class Recognizer:
 
     def _pinned(self, only: Hypothesis, contacts: Contacts, known: Surroundings) -> Hypothesis:
         """The only hypothesis left, determined only if all its poses are alike."""
-        entry = next(one for one in self._solids if one.model.name == only.object_name)
+        entry = next(one for one in self.library.solids if one.model.name == only.object_name)
         resting = known.support is not None and known.support.resting
         return pin_down(
             entry.test,

@@ -35,7 +35,7 @@ def warm_up() -> None:
         hits.points_world, hits.normals_world, position_error=0.01, normal_error=0.1
     )
     recognizer = Recognizer([box])
-    belief = recognizer.recognize(contacts).update(contacts)
+    belief = recognizer.update(recognizer.recognize(contacts), contacts)
     predict(sample_belief(belief, [box], 64), ProbeSpace(1.0, 5.0).rays(np.zeros((1, 3))))
     paths = FreeSpace(5.0 * np.eye(3), hits.points_world, error=0.01)
     floor = SupportPlane(height=-1.5, error=0.01, resting=True)

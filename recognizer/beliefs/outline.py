@@ -8,23 +8,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from time import perf_counter
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
-from ..belief import Search
 from ..contacts.contacts import Contacts
 from ..models.polygon import Polygon
 from ..poses.planar.pose import PlanarModelTest
 from ..tables.planar_ranges import PlanarTables
+from ..tree.limits import SearchLimits
 from ..tree.tree import Constraints, InterpretationTree, root
 from .hypotheses import Hypothesis, PoseTolerance
 from .planar_hypotheses import cluster_planar
-
-if TYPE_CHECKING:
-    from ..recognize import SearchLimits
+from .search import Search
 
 
 @dataclass(frozen=True, eq=False)

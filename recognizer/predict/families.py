@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from ..belief import Belief
 from ..beliefs.hypotheses import Hypothesis
-from ..beliefs.solid import SolidEntry
 from ..contacts.contacts import Contacts
 from ..contacts.support import SupportPlane
 from ..poses.fits.pose import kernel_contacts
 from ..poses.fits.spread_kernels import DRAWS, LINES, spread_over_families
+from ..poses.search.solid import SolidEntry
 
 SEED = 738
 """Of the random numbers, which are always the same: samples are a rule of the belief."""
@@ -59,9 +59,7 @@ def _grouped(belief: Belief, rows: NDArray[np.intp]) -> dict[tuple[str, int], li
         hypothesis = belief.hypotheses[row]
         face = -1
         if support is not None and support.resting:
-            face = _standing_face(
-                belief.recognizer.solid(hypothesis.object_name), hypothesis, support
-            )
+            face = _standing_face(belief.library.solid(hypothesis.object_name), hypothesis, support)
         groups[hypothesis.object_name, face].append(member)
     return groups
 
@@ -75,7 +73,7 @@ def _constraints(
     belief: Belief, name: str, face: int
 ) -> tuple[SolidEntry, Contacts, NDArray[np.int64]]:
     """A solid, what touches it, and the features that are known beforehand."""
-    entry, contacts = belief.recognizer.solid(name), belief.contacts.facing_approach()
+    entry, contacts = belief.library.solid(name), belief.contacts.facing_approach()
     none = np.zeros(0, np.int64)
     if face < 0 or belief.support is None:
         return entry, contacts, none

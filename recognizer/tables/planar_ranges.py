@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
-from ..models.planar_kernels import segment_distances, tilt_ranges
+from ..models.planar_kernels import segment_distances
 from ..models.polygon import Polygon
+from .planar_range_kernels import tilt_ranges
 from .ranges import ROUNDING
 
 Floats = NDArray[np.float64]

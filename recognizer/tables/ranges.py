@@ -66,7 +66,13 @@ class PairTables:
     @cached_property
     def triples(self) -> TripleTables:
         """Ranges over three faces, built when first asked for."""
-        return TripleTables(self)
+        return TripleTables(
+            normals=self.normals,
+            hull_corners=self.hull_corners,
+            hull_start=self.hull_start,
+            distances=(self.distance_min, self.distance_max),
+            tilts=(self.tilt_min, self.tilt_max),
+        )
 
     @classmethod
     def of(cls, model: Polyhedron, features: Features | None = None) -> PairTables:

@@ -13,19 +13,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
 from ..contacts.contacts import Contacts
-from ..tree import tree_kernels
 from . import triple_kernels
 from .triple_range_kernels import CORNER_TERMS, DUST, direction_cones, triple_range
-
-if TYPE_CHECKING:
-    from .ranges import PairTables
 
 SLACK = 1e-8
 """Every contact's bound is widened by this share of the diameter, and by what the pair tables are
@@ -34,8 +29,6 @@ MOST_CORNERS = 12
 """Hulls of more corners are replaced by a polygon around them; the work grows with the cube."""
 FIRST_SLOTS, MOST_SLOTS = 1 << 12, 1 << 21
 """Room for ranges that are remembered; half of it is used, and then all is forgotten."""
-BLOCK = 1 << 15
-"""Interpretations grown at a time: the search stays depth-first, and memory small."""
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -58,16 +51,32 @@ class TriangleRanges:
 class TripleTables:
     """Ranges over triples of a model's faces, each computed when it is first needed."""
 
-    def __init__(self, tables: PairTables) -> None:
-        """Prepare what is known of pairs; some milliseconds for a hundred faces."""
-        diameter = float(tables.distance_max.max())
-        corners, start = _few_corners(tables.hull_corners, tables.hull_start, tables.normals)
+    def __init__(
+        self,
+        *,
+        normals: Floats,
+        hull_corners: Floats,
+        hull_start: Ints,
+        distances: tuple[Floats, Floats],
+        tilts: tuple[Floats, Floats],
+    ) -> None:
+        """Prepare what is known of pairs; some milliseconds for a hundred faces.
+
+        Args:
+            normals: (f, 3) as of `ranges.PairTables`, as is all else.
+            hull_corners: (c, 3) see there.
+            hull_start: (f + 1,) see there.
+            distances: (f, f) least and greatest, metres.
+            tilts: (f, f) least and greatest, radians.
+        """
+        diameter = float(distances[1].max())
+        corners, start = _few_corners(hull_corners, hull_start, normals)
         cones, half_angles = direction_cones(corners, start, 0.1 * SLACK * diameter)
-        shape = (*tables.angle.shape, 3)
-        own = np.broadcast_to(tables.normals[:, None], shape)
+        shape = (len(normals), len(normals), 3)
+        own = np.broadcast_to(normals[:, None], shape)
         # A face is at least distance 0 from itself, so this is what the tables were widened by:
         # corners are off the face's plane by less, to either side.
-        self.slack = SLACK * diameter - 2.0 * float(tables.distance_min.diagonal().min())
+        self.slack = SLACK * diameter - 2.0 * float(distances[0].diagonal().min())
         """How far a point of a face may be off its hull, metres."""
         self._dust = DUST * diameter**2
         self._geometry = (
@@ -76,8 +85,8 @@ class TripleTables:
             _lifts(corners, start),
             # Directions from a to b: a cone, and their tilts against a's and against b's normal.
             np.ascontiguousarray(np.stack([cones, own, own.swapaxes(0, 1)], axis=2)),
-            np.stack([np.zeros(shape[:2]), tables.tilt_min, np.pi - tables.tilt_max.T], axis=2),
-            np.stack([half_angles, tables.tilt_max, np.pi - tables.tilt_min.T], axis=2),
+            np.stack([np.zeros(shape[:2]), tilts[0], np.pi - tilts[1].T], axis=2),
+            np.stack([half_angles, tilts[1], np.pi - tilts[0].T], axis=2),
         )
         self._terms = np.empty((int(np.diff(start).max()) ** 3, CORNER_TERMS))
         self._known = (np.full(FIRST_SLOTS, -1), np.empty((FIRST_SLOTS, 4, 2)), 0)
@@ -124,76 +133,6 @@ class TripleTables:
             keep,
         )
         return keep
-
-
-def grow_by_triples(
-    triples: TripleTables,
-    contacts: Contacts,
-    prefixes: NDArray[np.int32],
-    domains: NDArray[np.uint64],
-    masks: NDArray[np.uint64],
-    stop: int,
-    budget: int,
-    nodes: Ints,
-    *,
-    angles: bool,
-    areas: bool,
-) -> tuple[NDArray[np.int32], bool]:
-    """Extend interpretations as `tree_kernels.grow` does, but only by possible triangles.
-
-    Blocks of interpretations are grown level by level, the first block to the end before the next,
-    so the leaves come in the order in which `grow` finds them.
-
-    Args:
-        triples: the model's ranges.
-        contacts: what was felt, in the order of the search.
-        prefixes: (m, k) a face for each of the first k contacts, their own triangles checked.
-        domains: as of `tree_kernels.grow`, as are `masks` and `stop`.
-        masks: see there.
-        stop: how many contacts to reach.
-        budget: the most interpretations to return.
-        nodes: (n,) interpretations alive at each level after the filter, added to in place.
-        angles: whether to look at the angles of triangles.
-        areas: whether to look at their areas.
-
-    Returns:
-        (m', stop) interpretations, and whether that is all of them.
-    """
-    faces = masks.shape[2]
-    most = max(1, BLOCK // faces)
-    leaves, found = [np.zeros((0, stop), np.int32)], 0
-    waiting = _blocks(_with_future(prefixes, domains, masks, stop), most)
-    ignored = np.zeros_like(nodes)
-    while waiting:
-        block = waiting.pop()
-        level = block.shape[1]
-        rows, _ = tree_kernels.grow(
-            block, domains, masks, level + 1, len(block) * faces + 1, ignored
-        )
-        rows = rows[triples.possible(rows, contacts, angles=angles, areas=areas)]
-        nodes[level] += len(rows)
-        if level + 1 < stop:
-            waiting += _blocks(_with_future(rows, domains, masks, stop), most)
-            continue
-        leaves.append(rows[: budget - found])
-        if found + len(rows) > budget:
-            return np.concatenate(leaves), False
-        found += len(rows)
-    return np.concatenate(leaves), True
-
-
-def _with_future(
-    rows: NDArray[np.int32], domains: NDArray[np.uint64], masks: NDArray[np.uint64], stop: int
-) -> NDArray[np.int32]:
-    """Rows that leave a face to each contact below ``stop``; `grow` looks ahead one level here."""
-    keep = np.ones(len(rows), np.bool_)
-    triple_kernels.look_ahead(rows, domains, masks, stop, keep)
-    return rows[keep]
-
-
-def _blocks(rows: NDArray[np.int32], most: int) -> list[NDArray[np.int32]]:
-    """Blocks of at most ``most`` rows, the last rows first."""
-    return [rows[first : first + most] for first in range(0, len(rows), most)][::-1]
 
 
 def _few_corners(corners: Floats, start: Ints, normals: Floats) -> tuple[Floats, Ints]:

@@ -14,11 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..contacts.contacts import EDGE, Contacts
-from ..models import planar_kernels
 from ..tables.planar_ranges import PlanarTables
 from ..tables.ranges import PairTables
-from ..tables.triples import grow_by_triples
-from . import tree_kernels
+from . import planar_mask_kernels, tree_kernels
+from .triple_tree import grow_by_triples
 
 WORD = 64
 
@@ -116,7 +115,7 @@ class InterpretationTree:
             self._domains[level] = _as_bits(prefixes[:, level], len(self._all_faces))
         tables, contacts = self.tables, self.contacts
         planar = isinstance(tables, PlanarTables)
-        pair_masks = planar_kernels.pair_masks if planar else tree_kernels.pair_masks
+        pair_masks = planar_mask_kernels.pair_masks if planar else tree_kernels.pair_masks
         pair_masks(
             contacts.positions[:stop],
             contacts.normals[:stop],

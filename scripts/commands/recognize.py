@@ -102,7 +102,7 @@ def recognize(
         from ..page.page import write_page
         from ..page.story_contacts import Beliefs, contacts_story
 
-        told = Beliefs.of(felt, belief)
+        told = Beliefs.of(felt, belief, recognizer)
         story = contacts_story(contacts.name, recognizer, told, (units, metres(units)))
         console.print(
             f"\npage: {html}, {1e-6 * write_page(story, html):.1f} MB, opens in a browser"
@@ -113,7 +113,7 @@ def _tell(
     console: Console, recognizer: Recognizer, felt: FeltFile, belief: Belief, units: str
 ) -> None:
     """The answer for a person to read."""
-    tell_verdict(console, felt, belief)
+    tell_verdict(console, recognizer, felt, belief)
     found = belief.hypotheses
     if not found:
         return
@@ -124,19 +124,21 @@ def _tell(
     console.print(_matrix(found[0], units))
 
 
-def tell_verdict(console: Console, felt: FeltFile, belief: Belief) -> None:
+def tell_verdict(
+    console: Console, recognizer: Recognizer, felt: FeltFile, belief: Belief
+) -> None:
     """What there is, what it amounts to, and if nothing fits, why that may be."""
     from ...recognizer.advice.verdict import Verdict, verdict
 
     misses = f" and {felt.misses} ways that met nothing" if felt.misses else ""
     console.print(
-        f"{len(felt.contacts)} contacts{misses}, {len(belief.recognizer.models)} parts in the"
+        f"{len(felt.contacts)} contacts{misses}, {len(recognizer.models)} parts in the"
         " library."
     )
     word, found = verdict(belief), belief.hypotheses
     if not found:
         if word is Verdict.UNKNOWN:
-            _tell_why_nothing_fits(console, felt, belief)
+            _tell_why_nothing_fits(console, recognizer, felt, belief)
         else:
             console.print(
                 "[bold]Cut short[/]: nothing was found before a budget ran out, which rules nothing"
@@ -162,7 +164,7 @@ def _tell_same_parts(console: Console, belief: Belief, parts: list[str]) -> None
     """Say which of the parts left are one in two files: no touch tells these apart."""
     from ...recognizer.advice.twins import same_parts
 
-    models = [model for model in belief.recognizer.models if model.name in parts[:MOST_COMPARED]]
+    models = [model for model in belief.library.models if model.name in parts[:MOST_COMPARED]]
     for one, other in same_parts(models):
         console.print(f"{one} and {other} are the same part, in two files: remove one of them.")
 
@@ -171,10 +173,11 @@ def _some(parts: list[str]) -> str:
     return ", ".join(parts[:4]) + (f" and {len(parts) - 4} others" if len(parts) > 4 else "")
 
 
-def _tell_why_nothing_fits(console: Console, felt: FeltFile, belief: Belief) -> None:
+def _tell_why_nothing_fits(
+    console: Console, recognizer: Recognizer, felt: FeltFile, belief: Belief
+) -> None:
     from ...recognizer.advice.diagnosis import diagnose, too_far_apart
 
-    recognizer = belief.recognizer
     console.print("[bold]Not in this library[/]: no part fits these contacts.")
     times = too_far_apart(recognizer, belief.contacts)
     if times is not None:

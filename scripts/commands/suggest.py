@@ -174,7 +174,7 @@ def _tell(
     if belief is None or felt is None:
         console.print("Nothing was touched yet.")
     else:
-        tell_verdict(console, felt, belief)
+        tell_verdict(console, session.recognizer, felt, belief)
         if belief.empty:
             return
     if not named:

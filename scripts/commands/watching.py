@@ -91,7 +91,7 @@ def watched_stories(
                 free_space=felt.free_space,
                 support=given.support,
             )
-        beliefs = Beliefs.of(felt, belief, beliefs)
+        beliefs = Beliefs.of(felt, belief, recognizer, beliefs)
         unit = (watched.units, metres(watched.units))
         yield contacts_story(watched.path.name, recognizer, beliefs, unit, ended=False)
 

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from time import perf_counter
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...recognizer import Belief, Contacts, FeltFile, FreeSpace, Recognizer
+from ...recognizer import Belief, Contacts, FeltFile, FreeSpace, Recognizer, SearchLimits
 from ...recognizer.advice.verdict import Verdict, verdict
 from .episode_story import count
 from .story import HIT, MISSED, Moment, Story, Ways
@@ -17,9 +16,12 @@ __all__ = ["Beliefs", "contacts_story"]
 
 MOST_STEPS = 40
 """More touches are told several at a time."""
-PATIENCE = 1.0
-"""Seconds; once a belief of few touches takes longer, those of fewer are worked out without the
-ways that were free, and once that takes longer, not at all."""
+MOST_WITH_WAYS = 300
+"""Once a belief of few touches has more interpretations, each of which is held against every way
+that was free, those of fewer touches are worked out without these ways."""
+LIMITS = SearchLimits(budget=5_000, nodes=1_000_000)
+"""Of the beliefs of few touches; once one is cut short by them, it and those of fewer are left
+out. A step is counted and not timed, so that a page shows the same on every machine."""
 WAY = 0.6
 """How much of a way is drawn, in diameters of the largest part."""
 
@@ -42,7 +44,13 @@ class Beliefs:
     by_count: dict[int, Belief]
 
     @classmethod
-    def of(cls, felt: FeltFile, final: Belief | None, earlier: Beliefs | None = None) -> Beliefs:
+    def of(
+        cls,
+        felt: FeltFile,
+        final: Belief | None,
+        recognizer: Recognizer,
+        earlier: Beliefs | None = None,
+    ) -> Beliefs:
         """Work out what fewer contacts would have said, from the last one back.
 
         Few contacts allow much, which takes longer to find.
@@ -50,6 +58,7 @@ class Beliefs:
         Args:
             felt: what was felt.
             final: the belief of it all.
+            recognizer: that found it.
             earlier: of an earlier version of the file; what the contacts share is taken from it.
         """
         if final is None:
@@ -60,20 +69,23 @@ class Beliefs:
         if earlier and earlier.final and earlier.final.support == final.support:
             known = _shared(earlier, contacts)
         methods = [ways, FreeSpace.none()] if len(ways) else [FreeSpace.none()]
+        limited = recognizer.limited(LIMITS)
         for size in reversed(_halts(len(contacts))):
             if size in found or size <= final.outliers:
                 continue
             if size in known:
                 found[size] = known[size]
             elif methods:
-                started = perf_counter()
-                found[size] = final.recognizer.recognize(
+                belief = limited.recognize(
                     contacts[:size],
                     outliers=final.outliers,
                     free_space=_part(methods[0], slice(0, size)),
                     support=final.support,
                 )
-                if perf_counter() - started > PATIENCE:
+                if not belief.complete:
+                    break
+                found[size] = belief
+                if len(methods) > 1 and belief.interpretations > MOST_WITH_WAYS:
                     methods.pop(0)
         return cls(felt, final, found)
 

@@ -139,7 +139,7 @@ def _parents(before: Belief, after: Belief) -> dict[int, int]:
 
 
 def _likest(before: Belief, after: Belief) -> dict[int, int]:
-    models = {model.name: model for model in after.recognizer.models}
+    models = {model.name: model for model in after.library.models}
     found = {}
     for index, one in enumerate(after.hypotheses[:MOST_SHOWN]):
         model = models[one.object_name]

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...recognizer import Belief, Constraints, Contacts
-from ...recognizer.beliefs.solid import SolidEntry
+from ...recognizer.poses.search.solid import SolidEntry
 from ...recognizer.tree.tree import spread_order
 from ...recognizer.tree.tree_kernels import pair_masks
 
@@ -80,11 +80,10 @@ def count_branches(belief: Belief) -> tuple[TreeCount, ...]:
     """The trees of a belief, one a solid of its library, in that order.
 
     Args:
-        belief: of solids.
+        belief: of solids, by a recogniser with the constraints that it has unless told otherwise.
     """
-    recognizer = belief.recognizer
     order = spread_order(belief.contacts)
-    return tuple(_count(recognizer.solid(model.name), belief, order) for model in recognizer.models)
+    return tuple(_count(entry, belief, order) for entry in belief.library.solids)
 
 
 def _count(entry: SolidEntry, belief: Belief, order: NDArray[np.intp]) -> TreeCount:
@@ -93,7 +92,7 @@ def _count(entry: SolidEntry, belief: Belief, order: NDArray[np.intp]) -> TreeCo
     contacts = belief.contacts[order].facing_approach()
     words = -(-len(entry.features) // 64)
     most = int(np.sqrt(MOST_BYTES / (8 * words * (len(entry.features) + 1))))
-    tree = _Tree(entry, contacts[: max(most, 2)], belief.recognizer.constraints, belief.outliers)
+    tree = _Tree(entry, contacts[: max(most, 2)], Constraints(), belief.outliers)
     levels = []
     while tree.depth < len(tree.contacts) and len(tree.live) <= MOST_LIVE:
         levels.append(tree.grow(int(order[tree.depth])))

@@ -48,7 +48,7 @@ class Case:
     def recognize(self) -> Belief:
         """What the recogniser makes of it."""
         if self.told:
-            return self._told().update(self.contacts[self.told :])
+            return self.recognizer.update(self._told(), self.contacts[self.told :])
         return self.recognizer.recognize(
             self.contacts,
             outliers=self.outliers,
@@ -67,7 +67,13 @@ class Case:
             covariance=np.eye(6),
         )
         search = Search.none(self.model.name, self.told)
-        return Belief((truth,), (search,), self.contacts[: self.told], self.recognizer)
+        return Belief(
+            (truth,),
+            (search,),
+            self.contacts[: self.told],
+            self.recognizer.library,
+            self.recognizer.tolerance,
+        )
 
 
 @cache
