@@ -1,13 +1,12 @@
 """Rows of a benchmark on disk: a file each as they come, gathered in one as they get many.
 
-A file is written under another name, brought to disk and renamed: at whatever moment the process is
-killed, a row is there as a whole or not at all. A row that is there is never written again; while
-rows are gathered one may be in two files for a moment, alike in both.
+At whatever moment the process is killed, a row is there as a whole or not at all. A row that is
+there is never written again; while rows are gathered one may be in two files for a moment, alike in
+both.
 """
 
 from __future__ import annotations
 
-import os
 import types
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
@@ -15,6 +14,7 @@ from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Any, Union, get_args, get_origin, get_type_hints
 
+from ..whole_file import write_whole
 from .row import EpisodeRow
 
 MOST_PARTS = 256
@@ -101,16 +101,6 @@ def only_writer(folder: Path) -> Iterator[None]:
         except OSError as held:
             raise ValueError(f"{folder}: another benchmark is writing here") from held
         yield
-
-
-def write_whole(path: Path, content: bytes) -> None:
-    """Write a file so that it is there as a whole or not at all."""
-    half = path.with_name(f".{path.name}.half")
-    with half.open("wb") as file:
-        file.write(content)
-        file.flush()
-        os.fsync(file.fileno())
-    half.replace(path)
 
 
 def _write(rows: Iterable[EpisodeRow], path: Path) -> None:

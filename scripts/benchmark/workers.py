@@ -91,7 +91,7 @@ def player(folder: str) -> Play:
 
 
 def _play_job(folder: str, job: Job) -> EpisodeRow:
-    from ..lab.bench.__main__ import keep_to_one_thread
+    from ..one_thread import keep_to_one_thread
 
     keep_to_one_thread()
     look_in(folder)

@@ -104,7 +104,7 @@ def benchmark(
     It may be stopped or killed at any moment: the same command goes on where it was. Then
     `palpate report FOLDER` makes a page of it.
     """
-    from ..lab.bench.__main__ import keep_to_one_thread
+    from ..one_thread import keep_to_one_thread
 
     keep_to_one_thread()
     # Only now: what these import reads the number of threads once.
@@ -223,7 +223,7 @@ def _settle(config: BenchmarkConfig, folder: Path) -> None:
         ValueError: it is another benchmark's.
     """
     from ..benchmark.config import versions
-    from ..benchmark.store import write_whole
+    from ..whole_file import write_whole
 
     path = folder / SETTINGS_FILE
     wanted = json.loads(json.dumps(asdict(config) | {"versions": json.loads(versions())}))

@@ -58,9 +58,10 @@ def write_report(folder: Path, page: Path) -> None:
     Raises:
         ValueError: the folder isn't a benchmark's, or no episode has been played by all strategies.
     """
-    from ..benchmark.store import RowStore, write_whole
+    from ..benchmark.store import RowStore
     from ..report.page import html, markdown
     from ..report.text import TITLE
+    from ..whole_file import write_whole
     from .benchmark import read_settings
 
     settings = read_settings(folder)

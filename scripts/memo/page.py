@@ -106,7 +106,7 @@ def write_page(
     Returns:
         The files' path without ending.
     """
-    from ..benchmark.store import write_whole
+    from ..whole_file import write_whole
 
     folder.mkdir(parents=True, exist_ok=True)
     stem = folder / STEM

@@ -50,7 +50,7 @@ def open_plan(trials: int | None, seed: int, workers: int, console: Console) -> 
         workers: processes; with one, no other than this.
         console: where progress is shown, if it is a terminal.
     """
-    from ..lab.bench.__main__ import keep_to_one_thread
+    from ..one_thread import keep_to_one_thread
 
     keep_to_one_thread()
     if workers == 1:

@@ -14,7 +14,8 @@ from ...envs.sensors.grid import sense_grid
 from ...recognizer import PairTables, Polyhedron, Recognizer
 from ...recognizer.poses.fits.pose import ModelTest
 from ...recognizer.tree.tree import prune
-from ..lab.bench.report import noise_of, timed
+from ..timed import timed
+from .noise import noise_of
 
 Floats = NDArray[np.float64]
 

@@ -11,7 +11,7 @@ from importlib import resources
 from pathlib import Path
 from string import Template
 
-from ..benchmark.store import write_whole
+from ..whole_file import write_whole
 from .story import Story
 
 __all__ = ["check_page_path", "page", "story_json", "write_page"]

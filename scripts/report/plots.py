@@ -95,7 +95,7 @@ def save(figure: Figure, path: Path) -> str:
     """
     import matplotlib.pyplot as plt
 
-    from ..benchmark.store import write_whole
+    from ..whole_file import write_whole
 
     drawn = {}
     with _style():

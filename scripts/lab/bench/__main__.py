@@ -6,12 +6,13 @@ beside its goal where it has one.
 
 from __future__ import annotations
 
-import os
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
 import typer
+
+from ...one_thread import keep_to_one_thread
 
 QUICK = 10
 """What `--quick` divides cases and models by."""
@@ -87,12 +88,6 @@ def bench(
     show_header(settings)
     for part in only or parts:
         show(parts[part](settings))
-
-
-def keep_to_one_thread() -> None:
-    """Keep numerical libraries to one thread; numba's kernels here have no other."""
-    for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
-        os.environ[name] = "1"
 
 
 if __name__ == "__main__":

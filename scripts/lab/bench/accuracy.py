@@ -12,8 +12,9 @@ from ....assets.memo import table5
 from ....envs.library import load_library
 from ....envs.probe_env import INCH
 from ....recognizer import Recognizer, pose_difference
+from ...memo.noise import noise_of
 from .limit import mean_pose
-from .report import Case, Row, Section, Settings, draw_cases, noise_of, steps
+from .report import Case, Row, Section, Settings, draw_cases, steps
 
 FEWEST, MOST = 12, 20
 SHARE = 0.1

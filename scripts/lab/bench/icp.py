@@ -10,8 +10,10 @@ from scipy.spatial.transform import RigidTransform
 
 from ....envs.library import load_library
 from ....recognizer import Recognizer, pose_difference
+from ...memo.noise import noise_of
+from ...timed import timed
 from .icp_baseline import STARTS, MultiStartIcp
-from .report import Case, Row, Section, Settings, draw_cases, noise_of, steps, timed
+from .report import Case, Row, Section, Settings, draw_cases, steps
 from .speed import GOALS, TOUCHES
 
 

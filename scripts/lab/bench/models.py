@@ -8,8 +8,10 @@ import numpy as np
 
 from ....envs.library import load_library
 from ....recognizer import PairTables, Polyhedron, Recognizer
+from ...memo.noise import noise_of
+from ...timed import timed
 from ..random_library import large_solids
-from .report import Row, Section, Settings, draw_cases, median_and_tail, noise_of, steps, timed
+from .report import Row, Section, Settings, draw_cases, median_and_tail, steps
 
 TABLES_GOAL = 20.0
 RECOGNISE_GOAL = 50.0

@@ -11,7 +11,9 @@ from ....recognizer import Polyhedron, Recognizer
 from ....recognizer.predict.pose_samples import sample_belief
 from ....recognizer.predict.prediction import PoseSamples, predict
 from ....recognizer.predict.probes import ProbeSpace
-from .report import Row, Section, Settings, draw_cases, median_and_tail, noise_of, steps, timed
+from ...memo.noise import noise_of
+from ...timed import timed
+from .report import Row, Section, Settings, draw_cases, median_and_tail, steps
 
 Library = tuple[Polyhedron, ...]
 

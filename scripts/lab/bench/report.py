@@ -3,24 +3,22 @@
 from __future__ import annotations
 
 import platform
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
 from textwrap import fill
-from time import perf_counter, process_time
-from typing import ParamSpec, TypeVar
+from time import perf_counter
+from typing import TypeVar
 
 import numpy as np
 from rich.console import Console
 from rich.progress import Progress
 
-from ....envs.probe_env import INCH
 from ....envs.sensors.grid import TrueContacts, sense_grid
 from ....envs.sensors.noise import SensorNoise
 from ....recognizer import Belief, Contacts, Polyhedron
 
-P = ParamSpec("P")
 T = TypeVar("T")
 
 REDRAWN_EVERY = 0.5
@@ -85,11 +83,6 @@ class Case:
         )
 
 
-def noise_of(pi_over: float, inches: float) -> SensorNoise:
-    """Bounds as the memo gives them: pi over a number, radians, and inches."""
-    return SensorNoise(position_error=inches * INCH, normal_error=np.pi / pi_over)
-
-
 def draw_cases(
     models: Sequence[Polyhedron], noise: SensorNoise, touches: tuple[int, int], settings: Settings
 ) -> list[Case]:
@@ -124,16 +117,6 @@ def steps(items: Sequence[T], description: str) -> Iterator[T]:
             if perf_counter() - drawn > REDRAWN_EVERY:
                 progress.refresh()
                 drawn = perf_counter()
-
-
-def timed(call: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> tuple[T, float]:
-    """What a call returns, and the seconds that the processor spends on it.
-
-    On a quiet machine these are the clock's; on a busy one they are what is left of the truth.
-    """
-    started = process_time()
-    found = call(*args, **kwargs)
-    return found, process_time() - started
 
 
 def median_and_tail(seconds: Sequence[float]) -> tuple[float, float]:

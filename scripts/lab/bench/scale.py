@@ -12,8 +12,10 @@ import numpy as np
 
 from ....recognizer import Polyhedron, Recognizer
 from ....recognizer.tables.table_cache import cached_tables, table_key
+from ...memo.noise import noise_of
+from ...timed import timed
 from ..random_library import draw_solids
-from .report import Row, Section, Settings, draw_cases, noise_of, steps, timed
+from .report import Row, Section, Settings, draw_cases, steps
 from .speed import shares
 
 GOAL = 1.0

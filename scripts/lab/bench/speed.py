@@ -13,17 +13,9 @@ from ....assets import STAND_IN_NAMES
 from ....envs.library import load_library
 from ....recognizer import Belief, PairTables, Polyhedron, Recognizer
 from ....recognizer.tree.tree import WORD, prune, spread_order
-from .report import (
-    Case,
-    Row,
-    Section,
-    Settings,
-    draw_cases,
-    median_and_tail,
-    noise_of,
-    steps,
-    timed,
-)
+from ...memo.noise import noise_of
+from ...timed import timed
+from .report import Case, Row, Section, Settings, draw_cases, median_and_tail, steps
 
 TOUCHES = 16
 WARM_UP = 5

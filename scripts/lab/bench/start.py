@@ -13,8 +13,9 @@ import trimesh
 from numpy.typing import NDArray
 
 from ....envs.library import load_library
+from ...memo.noise import noise_of
 from ..random_library import random_library
-from .report import Case, Row, Section, Settings, draw_cases, noise_of, steps
+from .report import Case, Row, Section, Settings, draw_cases, steps
 
 GOAL = 2.0
 """Seconds by the clock."""

@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .__main__ import QUICK, keep_to_one_thread
+from ...one_thread import keep_to_one_thread
+from .__main__ import QUICK
 
 if TYPE_CHECKING:
     from ....envs.sensors.ball_sensor import BallSensor

@@ -19,7 +19,8 @@ from ....envs.sensors.noise import SensorNoise
 from ....envs.sensors.sensors import make_sensor
 from ....envs.sensors.touch import ProbeCommand, Sensor
 from ....recognizer import Polyhedron
-from .report import Row, Section, median_and_tail, steps, timed
+from ...timed import timed
+from .report import Row, Section, median_and_tail, steps
 
 TRIAD_GOAL = {"ray": 2e-5, "ball": 1e-3, "finger": 0.1}
 """Median time of a triad, seconds."""

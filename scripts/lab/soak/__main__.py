@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..bench.__main__ import keep_to_one_thread
+from ...one_thread import keep_to_one_thread
 
 if TYPE_CHECKING:
     from rich.table import Table

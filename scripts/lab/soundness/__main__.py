@@ -17,7 +17,7 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from ..bench.__main__ import keep_to_one_thread
+from ...one_thread import keep_to_one_thread
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -17,7 +17,7 @@ from ....envs.sensors.grid import sense_grid
 from ....recognizer import PairTables, Polyhedron
 from ....recognizer.poses.fits.pose import ModelTest
 from ....recognizer.tree.tree import prune
-from ...lab.bench.report import noise_of
+from ..noise import noise_of
 from ..pose import memo_pose
 
 Floats = NDArray[np.float64]

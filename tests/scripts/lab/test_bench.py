@@ -20,7 +20,8 @@ from palpate.scripts.lab.bench import report as bench_report
 from palpate.scripts.lab.bench import scale as bench_scale
 from palpate.scripts.lab.bench import speed as bench_speed
 from palpate.scripts.lab.bench import start as bench_start
-from palpate.scripts.lab.bench.report import Row, Section, Settings, draw_cases, noise_of
+from palpate.scripts.lab.bench.report import Row, Section, Settings, draw_cases
+from palpate.scripts.memo.noise import noise_of
 
 
 def test_the_commands_help_loads_nothing_heavy():
