@@ -13,6 +13,7 @@ from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from oracles.geometry import segment_distances
 from scipy.optimize import linprog, minimize
 
 from palpate.assets.planar import PLANAR_NAMES, planar_corners
@@ -147,19 +148,12 @@ def wrapped(angle: ArrayLike) -> Floats:
     return np.mod(np.asarray(angle) + np.pi, 2.0 * np.pi) - np.pi
 
 
-def edge_distances(points: Floats, segments: Floats) -> Floats:
-    """Distances of (..., 2) points from (..., 2, 2) segments."""
-    start, along = segments[..., 0, :], segments[..., 1, :] - segments[..., 0, :]
-    shares = ((points - start) * along).sum(-1) / (along**2).sum(-1)
-    return np.linalg.norm(points - start - np.clip(shares, 0, 1)[..., None] * along, axis=-1)
-
-
 def excesses(
     model: Polygon, contacts: Contacts, edges: NDArray[np.integer], angle: float, shift: Floats
 ) -> Floats:
     """(2n,) by how much each reading exceeds its bound at a pose, as a share of the bound."""
     points = (contacts.positions - shift) @ rotation(angle)
-    distances = edge_distances(points, model.segments[edges])
+    distances = segment_distances(points, model.segments[edges])
     known = contacts.normal_error < np.pi
     normals = contacts.normals[known] @ rotation(angle)
     true = model.normals[edges[known]]
@@ -262,7 +256,7 @@ def excess_grid(
     inwards = np.stack([np.stack([c, s], 1), np.stack([-s, c], 1)], 1)
     placed = np.einsum("tab,nb->tna", inwards, arms)
     points = spots[None, :, None] + placed[:, None]
-    worst = (edge_distances(points, model.segments[edges]) - delta).max(axis=2)
+    worst = (segment_distances(points, model.segments[edges]) - delta).max(axis=2)
     worst = np.maximum(worst, turning[:, None])
     # From a grid point to any pose in its cell: half a step of either kind.
     step = np.hypot(u[1] - u[0], v[1] - v[0]) / 2
@@ -317,5 +311,5 @@ def place_bracket(
     )
     assert found.success
     y = found.x[:2]
-    upper = (edge_distances(y + arms, model.segments[edges]) - contacts.position_error).max()
+    upper = (segment_distances(y + arms, model.segments[edges]) - contacts.position_error).max()
     return float(found.fun), float(upper)

@@ -13,6 +13,7 @@ from functools import cache
 import numpy as np
 import trimesh
 from numpy.typing import ArrayLike, NDArray
+from oracles.geometry import angle_between
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from palpate.assets import STAND_IN_NAMES, mesh_path
@@ -276,10 +277,6 @@ def face_distance(model: Polyhedron, a: int, b: int) -> tuple[float, float]:
 
 
 # --- The tree -------------------------------------------------------------------------------
-
-
-def angle_between(u: Floats, v: Floats) -> float:
-    return float(np.arctan2(np.linalg.norm(np.cross(u, v)), u @ v))
 
 
 def pair_margins(

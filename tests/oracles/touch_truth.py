@@ -6,7 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
-from oracles.checker import broken, check, corners_of, triangle_distances
+from oracles.checker import broken, check, corners_of
+from oracles.geometry import triangle_distances
 
 from palpate.envs.scene.placement import AcrossPlane
 from palpate.envs.scene.scene import ProbeScene

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trimesh
-from oracles.checker import triangle_distances
+from oracles.geometry import triangle_distances
 from oracles.solids import blocks
 from scipy.spatial.transform import RigidTransform, Rotation
 

@@ -16,6 +16,7 @@ from math import sin
 
 import numpy as np
 from numpy.typing import NDArray
+from oracles.geometry import signed_distances
 from scipy.spatial.transform import RigidTransform
 
 from ....envs.planar.planar_env import PlanarProbeEnv
@@ -27,7 +28,6 @@ from ....envs.sensors.finger_sensor import FingerSensor
 from ....envs.sensors.ray_sensor import RaySensor
 from ....recognizer import Polygon, Polyhedron
 from ....recognizer.models.rays import cast_rays
-from ..soundness.geometry import signed_distances
 from ..sweep_oracle import SweepOracle
 
 Floats = NDArray[np.float64]
@@ -168,7 +168,6 @@ def _judge_lines(env: ProbeEnv) -> list[Way]:
     directions = (paths.ends[rows] - paths.starts[rows]) / spans[rows, None]
     hits = cast_rays(model, pose, np.ascontiguousarray(paths.starts[rows]), directions)
     ways = []
-    triangles = pose.apply(model.vertices)[model.triangles]
     for row, direction, first in zip(rows, directions, hits.distances, strict=True):
         allowed = float(paths.error[row]) + ROUNDING
         beyond = float(spans[row] - first)
@@ -176,7 +175,7 @@ def _judge_lines(env: ProbeEnv) -> list[Way]:
         if beyond > allowed:
             depths = np.linspace(first, spans[row], SAMPLES)[:, None]
             places = paths.starts[row] + depths * direction
-            beyond = -float(signed_distances(places, triangles).min())
+            beyond = -float(signed_distances(model, pose.inv().apply(places)).min())
         ways.append(Way(beyond, allowed))
     return ways
 

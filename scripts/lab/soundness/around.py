@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from oracles.geometry import footings, signed_distances
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from ....envs.sensors.noise import uniform_in_ball, uniform_in_cone
 from ....recognizer import FreeSpace, Polyhedron, SupportPlane
 from ....recognizer.contacts.contacts import APPROACH_ERROR
 from ....recognizer.models.rays import cast_rays
-from .geometry import footings, signed_distances
 from .touch import INSIDE, Touched, random_pose, random_unit, shifted
 
 Floats = NDArray[np.float64]
@@ -53,7 +53,7 @@ def ball_paths(
     Returns:
         (m, 3) starts, (m, 3) ends and (m,) radii.
     """
-    size, triangles = model.diameter, model.vertices[model.triangles]
+    size = model.diameter
     starts = model.centroid + 1.3 * size * np.array([random_unit(rng) for _ in range(count)])
     aims = model.centroid + uniform_in_ball(rng, count, 0.6 * size)
     directions = (aims - starts) / np.linalg.norm(aims - starts, axis=1, keepdims=True)
@@ -61,7 +61,7 @@ def ball_paths(
     walked = np.zeros(count)
     for _ in range(500):
         places = starts + walked[:, None] * directions
-        room = signed_distances(places, triangles) - radii
+        room = signed_distances(model, places) - radii
         if (room < TOUCHING * size).all() or (walked >= 2.6 * size).all():
             break
         walked = np.minimum(walked + np.maximum(room, 0.0), 2.6 * size)

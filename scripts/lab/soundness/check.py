@@ -1,6 +1,6 @@
 """The soundness campaign's judge: is the truth held, and does a pose meet every bound?
 
-Plain numpy on triangles, see `soundness_geometry`: nothing of the recogniser's own geometry.
+Plain numpy on triangles, see `oracles.geometry`: nothing of the recogniser's own geometry.
 """
 
 from __future__ import annotations
@@ -10,20 +10,20 @@ from time import perf_counter
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import RigidTransform
-
-from ....recognizer import Belief, FreeSpace, Polygon, Polyhedron, SupportPlane
-from ....recognizer.contacts.contacts import APPROACH_ERROR
-from .case import Case
-from .geometry import (
+from oracles.geometry import (
     COPLANAR,
     angle_between,
-    cone_angle,
+    cone_angles,
     footings,
     nearest_on_paths,
     segment_distances,
     triangle_distances,
 )
+from scipy.spatial.transform import RigidTransform
+
+from ....recognizer import Belief, FreeSpace, Polygon, Polyhedron, SupportPlane
+from ....recognizer.contacts.contacts import APPROACH_ERROR
+from .case import Case
 from .touch import cone_of, hull_of
 
 Floats = NDArray[np.float64]
@@ -179,7 +179,7 @@ def _contact_breaches(case: Case, pose: RigidTransform, row: Row, model: Polyhed
         if distance > contacts.position_error[i] * (1.0 + ROUNDING):
             broken.append(f"has contact {i} {distance:.9g} m from feature {f}")
         unknown = contacts.normal_error[i] >= np.pi
-        angle = 0.0 if unknown else cone_angle(normals[i], cone)
+        angle = 0.0 if unknown else float(cone_angles(normals[i], cone))
         if angle > contacts.normal_error[i] * (1.0 + ROUNDING):
             broken.append(f"has normal {i} {angle:.9g} rad from feature {f}")
     return broken
@@ -243,11 +243,11 @@ def _path_breaches(model: Polyhedron, pose: RigidTransform, paths: FreeSpace) ->
     clearances = paths.radius - paths.error
     back = pose.inv()
     nearest = nearest_on_paths(
+        model,
         back.apply(paths.starts.copy()),
         back.apply(paths.ends.copy()),
         clearances,
         GRAIN * paths.error,
-        model.vertices[model.triangles],
     )
     near = nearest < clearances - ROUNDING * paths.error - EXACT * model.diameter
     return [

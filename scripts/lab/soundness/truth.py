@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from oracles.geometry import angle_between, cone_angles, segment_distances, triangle_distances
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from ....recognizer import ANYTHING, EDGE, FACE, VERTEX, Belief, Hypothesis, Polygon, Polyhedron
 from ....recognizer.contacts.contacts import APPROACH_ERROR
 from .case import Case
 from .check import EXACT, ROUNDING, breaches, feature_of, symmetric_images
-from .geometry import angle_between, cone_angle, segment_distances, triangle_distances
 
 Floats = NDArray[np.float64]
 Booleans = NDArray[np.bool_]
@@ -88,7 +88,7 @@ def _possible_features(case: Case, model: Polyhedron) -> Booleans:
     for row, feature in np.argwhere(possible):
         cone, bound = parts[feature][1], contacts.normal_error[row]
         faced = not contacts.approach_known[row] or float((cone @ backwards[row]).max()) >= least
-        near = bound >= np.pi or cone_angle(normals[row], cone) <= bound * (1.0 + ROUNDING)
+        near = bound >= np.pi or cone_angles(normals[row], cone) <= bound * (1.0 + ROUNDING)
         possible[row, feature] = faced and near
     return possible
 

@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 from oracles import solids as oracles
+from oracles.geometry import signed_distances
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from palpate.envs.scene.free_body import Displacement, displacement, grown, grown_free_space
@@ -154,44 +155,21 @@ def test_swept_space_holds_for_the_moved_object_once_it_is_grown(name):
         ends = before.apply(rng.normal(size=(8, 3)) * model.diameter)
         along = np.linspace(0.0, 1.0, 15)[:, None, None]
         points = starts + along * (ends - starts)
-        clear = signed_distances(model, before, points).min(axis=0)
+        clear = least_distances(model, before, points)
         # Paths said to be as clear as they were, be it less than nothing.
         radius = np.maximum(clear, 0.0) + 0.01
         paths = FreeSpace(starts, ends, radius=radius, error=radius - clear)
         wider = grown_free_space(paths, displacement(model, before, after))
-        now = signed_distances(model, after, points).min(axis=0)
+        now = least_distances(model, after, points)
         assert (now >= wider.clearance - 1e-12).all()
         nearer += int((now < paths.clearance).sum())
     assert nearer > 20
 
 
-def signed_distances(model, pose: RigidTransform, points: np.ndarray) -> np.ndarray:
-    """How far points are from a solid's surface, negative inside, triangle by triangle."""
+def least_distances(model, pose: RigidTransform, points: np.ndarray) -> np.ndarray:
+    """(m,) the least signed distance from an object at a pose of the places (k, m, 3) of paths."""
     at = pose.inv().apply(points.reshape(-1, 3))
-    nearest = np.full(len(at), np.inf)
-    for a, b, c in model.vertices[model.triangles]:
-        nearest = np.minimum(nearest, triangle_distances(at, a, b, c))
-    sides = model.vertices[model.triangles][None] - at[:, None, None]
-    a, b, c = sides[:, :, 0], sides[:, :, 1], sides[:, :, 2]
-    la, lb, lc = (np.linalg.norm(x, axis=-1) for x in (a, b, c))
-    above = (a * np.cross(b, c)).sum(-1)
-    below = la * lb * lc + (a * b).sum(-1) * lc + (b * c).sum(-1) * la + (c * a).sum(-1) * lb
-    inside = np.arctan2(above, below).sum(axis=1) > np.pi
-    return np.where(inside, -nearest, nearest).reshape(points.shape[:-1])
-
-
-def triangle_distances(points, a, b, c) -> np.ndarray:
-    """Distance to the plane where the foot is in the triangle, else to the nearest side."""
-    normal = np.cross(b - a, c - a)
-    normal = normal / np.linalg.norm(normal)
-    within = np.ones(len(points), bool)
-    to_sides = np.full(len(points), np.inf)
-    for one, other in ((a, b), (b, c), (c, a)):
-        side = other - one
-        within &= (points - one) @ np.cross(normal, side) >= 0.0
-        share = np.clip((points - one) @ side / (side @ side), 0.0, 1.0)[:, None]
-        to_sides = np.minimum(to_sides, np.linalg.norm(points - one - share * side, axis=1))
-    return np.where(within, np.abs((points - a) @ normal), to_sides)
+    return signed_distances(model, at).reshape(points.shape[:2]).min(axis=0)
 
 
 def test_paths_that_would_say_too_little_are_dropped():

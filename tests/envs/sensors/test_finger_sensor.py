@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
-from oracles.checker import cone_angles, cone_of, signed_distances
+from oracles.checker import cone_of
+from oracles.geometry import cone_angles, signed_distances
 from oracles.solids import blocks, box, hull_of, model
 from oracles.touch_truth import faults, touches_around
 from scipy.spatial.transform import RigidTransform, Rotation

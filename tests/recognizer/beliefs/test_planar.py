@@ -6,12 +6,12 @@ import dataclasses
 
 import numpy as np
 import pytest
+from oracles.geometry import segment_distances
 from oracles.outlines import (
     INCH,
     SMALL,
     Felt,
     descend,
-    edge_distances,
     entry,
     enumerate_interpretations,
     excess_grid,
@@ -29,9 +29,8 @@ from oracles.outlines import (
 from scipy.spatial.distance import pdist
 
 from palpate.assets.planar import PLANAR_NAMES
-from palpate.recognizer import Constraints, Contacts, PoseTolerance
+from palpate.recognizer import Constraints, Contacts, PoseTolerance, SearchLimits
 from palpate.recognizer.beliefs.outline import PlanarEntry, search_polygon, span_polygon
-from palpate.recognizer.models.planar_kernels import pair_masks
 from palpate.recognizer.models.polygon import Polygon
 from palpate.recognizer.poses.planar.exchange_kernels import (
     EXCLUDED,
@@ -43,8 +42,8 @@ from palpate.recognizer.poses.planar.exchange_kernels import (
 from palpate.recognizer.poses.planar.motion_kernels import assemble, fit
 from palpate.recognizer.poses.planar.pose import PlanarModelTest, _readings, lift
 from palpate.recognizer.poses.planar.search_kernels import allowed_rotations
-from palpate.recognizer.recognize import SearchLimits
-from palpate.recognizer.tree.tree.tree import prune, spread_order
+from palpate.recognizer.tree.planar_mask_kernels import pair_masks
+from palpate.recognizer.tree.tree import prune, spread_order
 
 SHAPES = (*PLANAR_NAMES, "square", "l-shape", "hexagon", "comb")
 NAMES = ("distance", "angle", "component", "tilt")
@@ -276,7 +275,7 @@ def test_the_convex_problem_at_one_angle_is_that_of_scipys_linear_program(name):
         if outcome == FOUND:
             assert lower <= slack
             placed = y + arms @ rotation(angle) + model.centroid
-            off = edge_distances(placed, model.segments[edges])
+            off = segment_distances(placed, model.segments[edges])
             assert (off <= contacts.position_error * (1 + 1e-8)).all()
             continue
         assert outcome == EXCLUDED

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from helpers.sensing import CUBE
 from numpy.typing import NDArray
-from oracles.checker import angle_between, check, cone_angles, triangle_distances
+from oracles.checker import check
+from oracles.geometry import angle_between, cone_angles, triangle_distances
 from oracles.proof_samples import direction, draw, read_at, start_near
 from scipy.spatial.transform import RigidTransform, Rotation
 

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from oracles import solids as oracles
-from oracles.checker import signed_distances
+from oracles.geometry import signed_distances
 
 from palpate.recognizer import Polyhedron
 from palpate.recognizer.models.distance_kernels import deepest, signed_distance

@@ -9,12 +9,13 @@ import pytest
 from helpers.sensing import CUBE, HOLED
 from numpy.typing import NDArray
 from oracles import solids as oracles
-from oracles.checker import cone_angles, cone_of
+from oracles.checker import cone_of
+from oracles.geometry import cone_angles
 from oracles.proof_samples import direction
 
 from palpate.recognizer import Polyhedron
 from palpate.recognizer.models.features import Features, all_features, face_features
-from palpate.recognizer.models.symmetry import feature_permutations
+from palpate.recognizer.models.permutations import feature_permutations
 
 Floats = NDArray[np.float64]
 

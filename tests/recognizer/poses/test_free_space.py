@@ -11,14 +11,8 @@ import pytest
 from helpers.sensing import CUBE, L_BLOCK, SMALL, feel, random_pose, touch_faces
 from numpy.typing import NDArray
 from oracles import solids as oracles
-from oracles.checker import (
-    broken,
-    cone_angles,
-    cone_of,
-    signed_distances,
-    standing_corners,
-    triangle_distances,
-)
+from oracles.checker import broken, cone_of
+from oracles.geometry import cone_angles, footings, signed_distances, triangle_distances
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from palpate.envs.sensors.noise import uniform_in_ball, uniform_in_cone
@@ -65,11 +59,6 @@ class Scene:
 def recognizer_of(name: str, edges: bool = False) -> Recognizer:
     model = SMALL[name] if name in SMALL else oracles.model(name)
     return Recognizer([model], features="all" if edges else "faces")
-
-
-@cache
-def standing(name: str) -> list[NDArray[np.intp]]:
-    return standing_corners(recognizer_of(name).models[0])
 
 
 def within_ball(rng: np.random.Generator, count: int, bound: float, at_bounds: bool) -> Floats:
@@ -143,10 +132,10 @@ def settle_down(
     pose = random_pose(rng)
     height = 0.0
     if resting:
-        faces = standing(model.name)
-        members = model.vertices[faces[rng.integers(len(faces))]]
+        faces = footings(model)
+        face = faces[rng.integers(len(faces))]
+        members, normal = face.corners, face.normal
         flat = np.linalg.svd(members - members.mean(axis=0))[2]
-        normal = flat[2] * np.sign(flat[2] @ (members.mean(axis=0) - model.centroid))
         tilt = np.cos(angle := rng.uniform(0.0, 2.0 * np.pi)) * flat[0] + np.sin(angle) * flat[1]
         extent = np.ptp(members @ tilt)
         turn = np.arcsin(min(0.5, 2.0 * error * share / extent))
@@ -257,8 +246,7 @@ def judge(scene: Scene, rng: np.random.Generator, checked: int = 3) -> tuple[lis
     model = scene.model
     features = scene.recognizer.features(model.name)
     given = {"free_space": scene.free_space, "support": scene.support}
-    stable = standing(model.name) if scene.support and scene.support.resting else None
-    known = given | {"standing": stable, "features": features}
+    known = given | {"features": features}
     # The scene itself is within all bounds, or it would prove nothing.
     wrong = broken(model, scene.pose, scene.contacts, scene.faces, **known)
     wrong = [f"the scene breaks {what}" for what in wrong]

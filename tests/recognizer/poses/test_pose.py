@@ -23,7 +23,8 @@ from helpers.sensing import (
 )
 from numpy.typing import NDArray
 from oracles import solids as oracles
-from oracles.checker import Oracle, angle_between, check
+from oracles.checker import Oracle, check
+from oracles.geometry import angle_between
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from palpate.assets import STAND_IN_NAMES

@@ -11,7 +11,8 @@ import pytest
 from helpers.sensing import INCH, SMALL, feel, forget_normals, sense_grid, touch_features
 from numpy.typing import NDArray
 from oracles import solids as oracles
-from oracles.checker import check, cone_angles, triangle_distances
+from oracles.checker import check
+from oracles.geometry import cone_angles, triangle_distances
 from oracles.proof_samples import STAND_INS, TESTS, direction, draw, read_at, start_near
 from scipy.spatial.transform import Rotation
 

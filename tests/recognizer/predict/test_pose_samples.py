@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from oracles.checker import check, corners_of, triangle_distances
+from oracles.checker import check, corners_of
+from oracles.geometry import triangle_distances
 from oracles.solids import model, random_contacts, random_pose
 from scipy.spatial.transform import RigidTransform, Rotation
 

@@ -7,9 +7,9 @@ import itertools
 import numpy as np
 import pytest
 import trimesh
+from oracles.geometry import angle_between
 from oracles.solids import (
     SOLIDS,
-    angle_between,
     box,
     convex_distance,
     face_distance,

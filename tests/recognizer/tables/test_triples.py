@@ -8,10 +8,10 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from oracles.geometry import angle_between
 from oracles.solids import (
     SOLIDS,
     Floats,
-    angle_between,
     as_set,
     box,
     enumerate_interpretations,

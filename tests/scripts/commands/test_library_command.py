@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 from helpers.command import run_here
-from oracles.checker import signed_distances
+from oracles.geometry import signed_distances
 from oracles.solids import blocks, box, model
 
 from palpate.recognizer import Polyhedron, Recognizer

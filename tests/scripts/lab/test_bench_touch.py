@@ -7,7 +7,7 @@ import sys
 
 import numpy as np
 import pytest
-from oracles.checker import signed_distances
+from oracles.geometry import signed_distances
 from oracles.solids import box, model, random_pose
 from scipy.spatial.transform import RigidTransform
 

@@ -172,7 +172,7 @@ def contacts_page(name: str = "felt.csv") -> Story:
     models = [replace(model("housing"), name=ODD_NAME), model("simple-hand")]
     recognizer = Recognizer(models)
     felt = FeltFile(contacts, FreeSpace.none(), (2, 3, 4, 5), 0)
-    beliefs = Beliefs.of(felt, recognizer.recognize(contacts))
+    beliefs = Beliefs.of(felt, recognizer.recognize(contacts), recognizer)
     return contacts_story(name, recognizer, beliefs, ("mm", 1e-3))
 
 
@@ -200,7 +200,7 @@ def test_ways_are_drawn_where_they_pass_and_what_met_nothing_comes_last():
     recognizer = Recognizer([model("housing")])
     belief = recognizer.recognize(contacts, free_space=ways)
     felt = FeltFile(contacts, ways, (2, 3, 4), 1)
-    told = contacts_story("t", recognizer, Beliefs.of(felt, belief), ("mm", 1e-3))
+    told = contacts_story("t", recognizer, Beliefs.of(felt, belief, recognizer), ("mm", 1e-3))
     assert told.moments[-1].belief is belief
     way = told.moments[-1].ways
     assert np.abs(way.starts - middle)[0, 0] < 0.3

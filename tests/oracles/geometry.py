@@ -1,4 +1,4 @@
-"""Plain geometry that the soundness campaign judges by: numpy on triangles, no kernel of palpate.
+"""Plain geometry of solids, for oracles and for the lab's judges: numpy, no kernel of palpate.
 
 Everything here is written a second time on purpose, slowly and simply, so that an error in the
 recogniser's own geometry can't hide itself.
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
-from ....recognizer import Polyhedron
+from palpate.recognizer import Polyhedron
 
 Floats = NDArray[np.float64]
 
@@ -24,28 +24,30 @@ CHUNK = 100_000
 
 
 def angle_between(a: Floats, b: Floats) -> Floats:
-    """Angles between unit vectors (..., d), radians; accurate near 0 and pi too."""
-    return 2.0 * np.arctan2(np.linalg.norm(a - b, axis=-1), np.linalg.norm(a + b, axis=-1))
+    """Angles between vectors (..., d) of any length, radians; accurate near 0 and pi too."""
+    one, other = (v * np.linalg.norm(w, axis=-1, keepdims=True) for v, w in ((a, b), (b, a)))
+    apart, together = np.linalg.norm(one - other, axis=-1), np.linalg.norm(one + other, axis=-1)
+    return 2.0 * np.arctan2(apart, together)
 
 
-def cone_angle(direction: Floats, cone: Floats) -> float:
-    """The angle of a unit vector (3,) from the convex cone of unit normals (k, 3), radians.
+def cone_angles(directions: Floats, cone: Floats) -> Floats:
+    """Angles (...) of unit vectors (..., 3) from the convex cone of unit normals (k, 3), radians.
 
     In whatever order those come: the nearest direction is one of them, between two, or it is the
     vector itself, between three.
     """
-    least = float(angle_between(direction, cone).min())
+    angles = np.stack([angle_between(directions, normal) for normal in cone]).min(axis=0)
     for pair in combinations(cone, 2):
-        shares = direction @ np.linalg.pinv(np.array(pair))
+        shares = directions @ np.linalg.pinv(np.array(pair))
         foot = shares @ np.array(pair)
-        if (shares >= 0.0).all():
-            away = float(np.linalg.norm(direction - foot))
-            least = min(least, float(np.arctan2(away, np.linalg.norm(foot))))
+        away = np.linalg.norm(directions - foot, axis=-1)
+        angle = np.arctan2(away, np.linalg.norm(foot, axis=-1))
+        angles = np.where((shares >= 0.0).all(axis=-1), np.minimum(angles, angle), angles)
     for three in combinations(cone, 3):
-        corners = np.array(three)
-        if np.linalg.cond(corners) < 1e12 and (direction @ np.linalg.inv(corners) >= 0.0).all():
-            return 0.0
-    return least
+        if np.linalg.cond(np.array(three)) < 1e12:
+            inside = (directions @ np.linalg.inv(np.array(three)) >= 0.0).all(axis=-1)
+            angles = np.where(inside, 0.0, angles)
+    return angles
 
 
 def segment_distances(points: Floats, segments: Floats) -> Floats:
@@ -75,8 +77,9 @@ def triangle_distances(points: Floats, triangles: Floats) -> Floats:
     return np.where(above, heights, to_edges)
 
 
-def signed_distances(points: Floats, triangles: Floats) -> Floats:
-    """(p,) distances of points (p, 3) from a closed surface (t, 3, 3), negative inside it."""
+def signed_distances(model: Polyhedron, points: Floats) -> Floats:
+    """(p,) distances of points (p, 3) from a solid's surface, object frame, negative inside it."""
+    triangles = model.vertices[model.triangles]
     found = np.empty(len(points))
     step = max(1, CHUNK // len(triangles))
     for first in range(0, len(points), step):
@@ -93,13 +96,13 @@ def signed_distances(points: Floats, triangles: Floats) -> Floats:
 
 
 def nearest_on_paths(
-    starts: Floats, ends: Floats, clearances: Floats, grains: Floats, triangles: Floats
+    model: Polyhedron, starts: Floats, ends: Floats, clearances: Floats, grains: Floats
 ) -> Floats:
-    """(m,) the least signed distance from a surface that is found along straight paths.
+    """(m,) the least signed distance from a solid that is found along straight paths.
 
-    Paths are walked in steps that a signed distance allows, which changes no faster than the path
-    is long: between two places looked at a path is no nearer than its clearance less its grain.
-    Paths end early where they are too near.
+    Paths (m, 3), object frame, are walked in steps that a signed distance allows, which changes no
+    faster than the path is long: between two places looked at a path is no nearer than its
+    clearance less its grain. Paths end early where they are too near.
     """
     spans = np.linalg.norm(ends - starts, axis=1)
     along = (ends - starts) / np.where(spans > 0.0, spans, 1.0)[:, None]
@@ -107,7 +110,7 @@ def nearest_on_paths(
     walking = np.arange(len(starts))
     while len(walking):
         places = starts[walking] + at[walking, None] * along[walking]
-        distances = signed_distances(places, triangles)
+        distances = signed_distances(model, places)
         least[walking] = np.minimum(least[walking], distances)
         room = distances - clearances[walking]
         going = (room > -grains[walking]) & (at[walking] < spans[walking])
