@@ -16,6 +16,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from .groups import DIRECTION_TOLERANCE, SHIFT_TOLERANCES_IN, count_groups, directions_of
+
 if TYPE_CHECKING:
     from ...recognizer import Contacts, Polyhedron
 
@@ -72,7 +74,6 @@ def memo_poses(
     """
     from ...envs.probe_env import INCH
     from .pose import memo_pose
-    from .trial import directions_of
 
     count = len(interpretations)
     rotations, shifts = np.tile(np.eye(3), (count, 1, 1)), np.zeros((count, 3))
@@ -102,8 +103,6 @@ def memo_left(trials: Sequence[MemoPoses]) -> MemoLeft:
 
     What has no pose is left, but is no transform; a trial has at least one of these.
     """
-    from .trial import DIRECTION_TOLERANCE, SHIFT_TOLERANCES_IN, count_groups
-
     right = [float(trial.misses_in[trial.right]) for trial in trials]
     widest = float(np.quantile(right, SHARE, method="inverted_cdf"))
     counts, directions = [], []

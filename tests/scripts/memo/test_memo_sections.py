@@ -19,7 +19,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from palpate.assets.memo import PoseErrorRow, range_views, table5, timing
 from palpate.envs.probe_env import INCH
 from palpate.recognizer import Contacts
-from palpate.recognizer.tree.tree.tree import Pruned
+from palpate.recognizer.tree.tree import Pruned
 from palpate.scripts.commands.report.page import Figure, Table, html, markdown
 from palpate.scripts.memo import timing as memo_timing
 from palpate.scripts.memo import timing_trials as memo_timing_trials

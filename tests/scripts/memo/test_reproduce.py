@@ -15,10 +15,10 @@ from rich.console import Console
 from scipy.spatial.transform import Rotation
 
 from palpate.assets import memo
-from palpate.envs.sensors.sensors.grid import sense_grid
-from palpate.envs.sensors.sensors.noise import SensorNoise
+from palpate.envs.sensors.grid import sense_grid
+from palpate.envs.sensors.noise import SensorNoise
 from palpate.recognizer import Constraints
-from palpate.recognizer.tree.tree.tree import prune
+from palpate.recognizer.tree.tree import prune
 from palpate.scripts.commands.reproduce import GROUPS, ORDER, reproduce
 from palpate.scripts.memo import constraints as memo_constraints
 from palpate.scripts.memo import grid as memo_grid
@@ -26,18 +26,12 @@ from palpate.scripts.memo import levels as memo_levels
 from palpate.scripts.memo import planar as memo_planar
 from palpate.scripts.memo import triads as memo_triads
 from palpate.scripts.memo.coarse import SHARE, memo_left, memo_poses
+from palpate.scripts.memo.groups import count_groups, directions_of
 from palpate.scripts.memo.judge import Row, four, judge
 from palpate.scripts.memo.page import as_data, verdict, write_page
 from palpate.scripts.memo.pool import open_plan
 from palpate.scripts.memo.section import Comparison, Section
-from palpate.scripts.memo.trial import (
-    Batch,
-    Spec,
-    count_groups,
-    count_stages,
-    directions_of,
-    prepared,
-)
+from palpate.scripts.memo.trial import Batch, Spec, count_stages, prepared
 
 INCH = 0.0254
 
