@@ -165,7 +165,8 @@ def test_what_is_felt_as_said_leaves_the_rivals_that_said_so_alone():
                     position_error=REACH,
                     normal_error=CONE,
                 )
-                left = {hypothesis.object_name for hypothesis in belief.update(felt).hypotheses}
+                after = session.recognizer.update(belief, felt)
+                left = {hypothesis.object_name for hypothesis in after.hypotheses}
                 assert report.rivals[0].object_name in left
                 told_apart += len(left) < len({h.object_name for h in belief.hypotheses})
     assert told_apart > 0

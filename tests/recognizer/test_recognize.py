@@ -422,7 +422,8 @@ def hand_made(cube: Polyhedron, count: int, *, determined: bool, complete: bool)
         Search(f"object {k}", np.ones(3, np.int64), 2, 2, 1, complete or k != 1, 0, 0.0, 0.0)
         for k in range(2)
     )
-    return Belief(hypotheses, searches, Contacts.none(), Recognizer([cube]))
+    known = Recognizer([cube])
+    return Belief(hypotheses, searches, Contacts.none(), known.library, known.tolerance)
 
 
 @pytest.mark.parametrize(

@@ -112,7 +112,7 @@ def test_three_motions_are_within_what_is_allowed_if_no_direction_reaches_beyond
 
 
 def _test_of(model: Polyhedron):
-    return Recognizer([model])._solids[0].test
+    return Recognizer([model]).library.solids[0].test
 
 
 @pytest.mark.parametrize("name", list(SMALL))

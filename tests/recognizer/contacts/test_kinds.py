@@ -100,7 +100,7 @@ def test_further_contacts_of_known_kinds_extend_a_belief() -> None:
     for _ in range(20):
         contacts, _ = felt(WEDGE, 7, 2, rng)
         first = recognizer.recognize(contacts[slice(0, 4)])
-        after = first.update(contacts[slice(4, None)])
+        after = recognizer.update(first, contacts[slice(4, None)])
         rows = {tuple(map(int, row)) for h in after.hypotheses for row in h.interpretations}
         assert rows == interpretations(recognizer, contacts)
 

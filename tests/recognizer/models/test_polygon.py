@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from oracles.outlines import L_SHAPE, OUTLINES, edge_distances, regular, rotation
+from oracles.geometry import segment_distances
+from oracles.outlines import L_SHAPE, OUTLINES, regular, rotation
 
 from palpate.assets.planar import PLANAR_NAMES, PLANAR_STAND_INS, planar_corners
 from palpate.recognizer.models.polygon import Polygon
@@ -136,7 +137,7 @@ def test_symmetries_are_a_group_that_maps_the_outline_onto_itself(name):
     np.testing.assert_allclose(np.linalg.det(found), 1.0)
     for turn in found:
         image = (shape.corners - shape.centroid) @ turn.T + shape.centroid
-        distances = edge_distances(image[:, None], shape.segments)
+        distances = segment_distances(image[:, None], shape.segments)
         assert distances.min(axis=1).max() < 1e-9 * shape.diameter
         products = turn @ found
         apart = np.abs(products[:, None] - found).max(axis=(2, 3))
@@ -191,7 +192,7 @@ def test_finely_sampled_edges_in_single_precision_are_edges_still(name):
     assert finer.face_count == shape.face_count
     np.testing.assert_allclose(finer.corners, shape.corners, atol=2e-6 * shape.diameter)
     assert finer.straightness < 2e-6 * shape.diameter
-    off = edge_distances(rounded.astype(float)[:, None], finer.segments).min(axis=1)
+    off = segment_distances(rounded.astype(float)[:, None], finer.segments).min(axis=1)
     assert off.max() == pytest.approx(finer.straightness, abs=1e-15 * shape.diameter)
 
 

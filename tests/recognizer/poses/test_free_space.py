@@ -564,7 +564,7 @@ def test_knowledge_in_parts_leaves_the_same_as_all_at_once(name: str, kind: str)
             contacts[rows[0]], free_space=parts[0], support=scene.support
         )
         for row, part in zip(rows[1:], parts[1:], strict=True):
-            belief = belief.update(contacts[row], free_space=part)
+            belief = scene.recognizer.update(belief, contacts[row], free_space=part)
         whole = scene.recognizer.recognize(
             contacts, free_space=FreeSpace.join(parts), support=scene.support
         )
@@ -596,15 +596,16 @@ def test_knowledge_in_parts_leaves_the_same_as_all_at_once(name: str, kind: str)
 
 def test_free_space_alone_can_follow_the_contacts() -> None:
     motion = random_pose(np.random.default_rng(8))
-    belief = Recognizer([L_BLOCK]).recognize(two_ways(motion))
+    recognizer = Recognizer([L_BLOCK])
+    belief = recognizer.recognize(two_ways(motion))
     path = FreeSpace(
         motion.apply([[0.05, 0.04, -0.1]]), motion.apply([[0.05, 0.04, 0.1]]), error=5e-4
     )
-    later = belief.update(Contacts.none(), free_space=path)
+    later = recognizer.update(belief, Contacts.none(), free_space=path)
     assert sorted(ways(belief, motion)) == [False, True]
     assert ways(later, motion) == [True]
     assert len(later.free_space) == 1
-    assert ways(later.update(Contacts.none()), motion) == [True]
+    assert ways(recognizer.update(later, Contacts.none()), motion) == [True]
 
 
 def test_nothing_known_besides_changes_nothing() -> None:
@@ -701,4 +702,4 @@ def test_outlines_of_the_plane_take_neither_free_space_nor_a_support(known: str)
         recognizer.recognize(contacts, **given)
     belief = recognizer.recognize(contacts)
     with pytest.raises(ValueError, match=r"free space .* for solids"):
-        belief.update(contacts, free_space=FreeSpace.none())
+        recognizer.update(belief, contacts, free_space=FreeSpace.none())

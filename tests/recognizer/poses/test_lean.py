@@ -62,7 +62,7 @@ def _some_direction(entry, contacts: Contacts, faces, directions, middle, angle,
 @pytest.mark.parametrize("name", list(SMALL))
 def test_the_true_faces_lean_in_the_true_cell_and_in_any(name: str) -> None:
     model = SMALL[name]
-    entry = Recognizer([model])._solids[0]
+    entry = Recognizer([model]).library.solids[0]
     rng = np.random.default_rng([1, len(name)])
     for case in range(CASES):
         faces = rng.integers(0, model.face_count, rng.integers(2, 9))
@@ -82,7 +82,7 @@ def test_the_true_faces_lean_in_the_true_cell_and_in_any(name: str) -> None:
 @pytest.mark.parametrize("name", list(SMALL))
 def test_leanings_are_ruled_out_as_by_trying_all_directions(name: str) -> None:
     model = SMALL[name]
-    entry = Recognizer([model])._solids[0]
+    entry = Recognizer([model]).library.solids[0]
     rng = np.random.default_rng([2, len(name)])
     directions = _spread_directions()
     answers = np.zeros((2, 2), int)
@@ -114,7 +114,7 @@ def test_leanings_are_ruled_out_as_by_trying_all_directions(name: str) -> None:
 
 def test_measurements_that_are_exact_and_the_same_rule_nothing_out() -> None:
     model = SMALL["cube"]
-    entry = Recognizer([model])._solids[0]
+    entry = Recognizer([model]).library.solids[0]
     rng = np.random.default_rng(3)
     touches = touch_faces(model, rng, [0, 0, 0, 0])
     tight = exact(touches, 1e-9, 1e-9)

@@ -37,7 +37,7 @@ def all_allowed(belief: Belief, samples: PoseSamples) -> bool:
         hypothesis = belief.hypotheses[samples.hypotheses[row]]
         solid = samples.models[samples.objects[row]]
         assert solid.name == hypothesis.object_name
-        features = belief.recognizer.features(solid.name)
+        features = belief.library.solid(solid.name).features
         faces = hypothesis.interpretations[0]
         judged = check(solid, pose_of(samples, row), belief.contacts, faces, 1e-6, features)
         if hypothesis.proven and not judged.passed:

@@ -23,7 +23,7 @@ def test_some_cell_holds_the_true_rotation_with_the_true_face_of_the_first_conta
     name: str, known: bool
 ) -> None:
     model = SMALL[name]
-    entry = Recognizer([model])._solids[0]
+    entry = Recognizer([model]).library.solids[0]
     rng = np.random.default_rng([5, len(name), known])
     dropped = 0
     for _ in range(EVERY):
@@ -45,7 +45,7 @@ def test_some_cell_holds_the_true_rotation_with_the_true_face_of_the_first_conta
 @pytest.mark.parametrize("name", list(SMALL))
 def test_there_is_room_for_the_middle_of_contacts_on_their_true_faces(name: str) -> None:
     model = SMALL[name]
-    slabs = feature_slabs(Recognizer([model])._solids[0].test.model)
+    slabs = feature_slabs(Recognizer([model]).library.solids[0].test.model)
     rng = np.random.default_rng([6, len(name)])
     crowded = 0
     for case in range(20 * EVERY):

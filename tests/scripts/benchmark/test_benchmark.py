@@ -18,14 +18,15 @@ import pytest
 from helpers.made_up_rows import made_up_row, small
 
 from palpate.scripts import cli
-from palpate.scripts.commands.benchmark import MEMO_NOISE, benchmark, run_benchmark
-from palpate.scripts.commands.benchmark import store as benchmark_store
-from palpate.scripts.commands.benchmark.config import BenchmarkConfig, parse_noise
-from palpate.scripts.commands.benchmark.playing import make_env, open_episode, play, task_of
-from palpate.scripts.commands.benchmark.row import GAVE_UP, SOLVED, EpisodeRow
-from palpate.scripts.commands.benchmark.store import RowStore, only_writer
+from palpate.scripts.benchmark import store as benchmark_store
+from palpate.scripts.benchmark.config import BenchmarkConfig, parse_noise
+from palpate.scripts.benchmark.playing import make_env, open_episode, play, task_of
+from palpate.scripts.benchmark.row import GAVE_UP, SOLVED, EpisodeRow
+from palpate.scripts.benchmark.run import run_benchmark
+from palpate.scripts.benchmark.store import RowStore, only_writer
+from palpate.scripts.commands.benchmark import MEMO_NOISE, benchmark
 
-ROOT = Path(__file__).resolve().parent.parent
+TESTS = Path(__file__).resolve().parents[2]
 QUICK = ("--objects", "simple-hand", "--noise", "5deg,0.01in")
 
 
@@ -152,7 +153,7 @@ def test_an_answer_is_right_if_it_is_the_truth_and_wrong_if_it_is_another_object
     from types import SimpleNamespace
 
     from palpate.policies import make_policy
-    from palpate.scripts.commands.benchmark import playing
+    from palpate.scripts.benchmark import playing
 
     config = small(noise=("5deg,0.01in",), max_probes=40)
     (setting,) = config.settings
@@ -381,7 +382,7 @@ def test_two_workers_bring_the_rows_that_one_does(tmp_path, monkeypatch, capsys)
 
 
 def test_the_strategy_of_the_guide_is_played_and_reported(tmp_path, monkeypatch, capsys):
-    guide = (ROOT / "docs" / "own-policy.md").read_text(encoding="utf-8")
+    guide = (TESTS.parent / "docs" / "own-policy.md").read_text(encoding="utf-8")
     (program,) = re.findall(r"```python\n(.*?)```", guide, re.DOTALL)
     (tmp_path / "near.py").write_text(program)
     monkeypatch.chdir(tmp_path)
@@ -397,11 +398,11 @@ def test_the_strategy_of_the_guide_is_played_and_reported(tmp_path, monkeypatch,
 PROGRAM = """
 import sys, time
 from pathlib import Path
-from made_up_rows import made_up_row, small
-from palpate.scripts import benchmark_store
-from palpate.scripts.commands.benchmark import MEMO_NOISE, benchmark, run_benchmark
+from helpers.made_up_rows import made_up_row, small
+from palpate.scripts.benchmark import store
+from palpate.scripts.benchmark.run import run_benchmark
 
-benchmark_store.MOST_PARTS = 6
+store.MOST_PARTS = 6
 
 def play(job):
     time.sleep(0.002)
@@ -440,10 +441,7 @@ def kill_and_go_on(
 
 def test_killed_at_random_moments_no_row_is_lost_or_changed(tmp_path):
     episodes = 120
-    environment = {
-        **os.environ,
-        "PYTHONPATH": os.pathsep.join([str(Path(__file__).parent), *sys.path]),
-    }
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(TESTS), *sys.path])}
 
     def start():
         arguments = [sys.executable, "-c", PROGRAM, str(tmp_path), str(episodes)]
@@ -480,7 +478,7 @@ def test_a_configuration_without_sense_is_refused():
 @pytest.mark.parametrize(("sensor", "placement"), [("ray", "across"), ("finger", "resting")])
 def test_an_episode_that_begins_with_a_copy_goes_on_as_the_episode_itself(sensor, placement):
     from palpate.policies import make_policy
-    from palpate.scripts.commands.benchmark.workers import player
+    from palpate.scripts.benchmark.workers import player
 
     config = small(
         objects=("simple-hand",),

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from helpers.made_up_rows import made_up_row, small
 
-from palpate.scripts.commands.benchmark.store import RowStore
+from palpate.scripts.benchmark.store import RowStore
 
 # Ray warns as it likes and starts threads: it runs in processes of its own.
 pytest.importorskip("ray", reason="palpate[ray] isn't installed")
@@ -19,8 +19,8 @@ pytest.importorskip("ray", reason="palpate[ray] isn't installed")
 LOCAL = """
 import sys
 from pathlib import Path
-from made_up_rows import made_up_row, small
-from palpate.scripts.commands.benchmark import run_benchmark
+from helpers.made_up_rows import made_up_row, small
+from palpate.scripts.benchmark.run import run_benchmark
 
 run_benchmark(small(), Path(sys.argv[1]), made_up_row, workers=2, backend="ray")
 """
@@ -30,8 +30,8 @@ import sys, time
 from pathlib import Path
 
 import ray
-from made_up_rows import made_up_row, small
-from palpate.scripts.commands.benchmark import run_benchmark
+from helpers.made_up_rows import made_up_row, small
+from palpate.scripts.benchmark.run import run_benchmark
 from palpate.scripts.benchmark.store import RowStore
 from ray.cluster_utils import Cluster
 
@@ -60,7 +60,7 @@ cluster.shutdown()
 
 
 def run(program: str, folder: Path) -> None:
-    path = os.pathsep.join([str(Path(__file__).parent), *sys.path])
+    path = os.pathsep.join([str(Path(__file__).resolve().parents[2]), *sys.path])
     told = subprocess.run(
         [sys.executable, "-c", program, str(folder)],
         env={**os.environ, "PYTHONPATH": path, "RAY_USAGE_STATS_ENABLED": "0"},

@@ -19,7 +19,7 @@ from palpate.envs.sensors.grid import sense_grid
 from palpate.envs.sensors.noise import SensorNoise
 from palpate.recognizer import Constraints
 from palpate.recognizer.tree.tree import prune
-from palpate.scripts.commands.reproduce import GROUPS, ORDER, reproduce
+from palpate.scripts.commands.reproduce import ORDER, groups, reproduce
 from palpate.scripts.memo import constraints as memo_constraints
 from palpate.scripts.memo import grid as memo_grid
 from palpate.scripts.memo import levels as memo_levels
@@ -428,5 +428,5 @@ def test_a_wrong_experiment_or_folder_is_refused_before_anything_runs(tmp_path):
 
 
 def test_every_experiment_has_one_module_that_runs_it():
-    names = [name for group in GROUPS for name in group.names]
+    names = [name for group in groups() for name in group]
     assert sorted(names) == sorted(ORDER)
