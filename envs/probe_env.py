@@ -25,6 +25,7 @@ from ..recognizer.predict.pose_samples import sample_belief
 from ..recognizer.predict.prediction import PoseSamples
 from .library import LibrarySource, load_library
 from .observation import Observation, ObservationLayout
+from .pictures.episode import Episode
 from .scene.free_body import STILL
 from .scene.free_object import SINK, FreeObject
 from .scene.placement import make_placement
@@ -274,6 +275,23 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
         """What each probe reported."""
         return self._evidence.touches
 
+    @property
+    def episode(self) -> Episode:
+        """The episode as it stands, the truth included; for scoring and pictures alone.
+
+        Raises:
+            gymnasium.error.ResetNeeded: before the first reset.
+        """
+        return Episode(
+            library=self.library,
+            true_object=self.true_object,
+            T_world_object=self.T_world_object,
+            touches=self.touches,
+            contacts=self.contacts,
+            belief=self.belief,
+            tolerance=self.recognizer.tolerance,
+        )
+
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, dict[str, Any]]:
@@ -328,7 +346,7 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
         """
         if self._view is None or self.render_mode != "rgb_array":
             return None
-        return self._view.picture(self)
+        return self._view.picture(self.episode)
 
     def close(self) -> None:
         """End what draws, and close the window, if there is one."""
@@ -380,7 +398,7 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
 
     def _show(self) -> None:
         if self._view is not None:
-            self._view.show(self)
+            self._view.show(self.episode)
 
     def _observe(self) -> Observation:
         # Past max_probes an episode may be stepped on; the observation keeps its last rows.

@@ -15,7 +15,7 @@ from PIL import Image as ImageLib
 from PIL import ImageDraw, ImageFont
 from PIL.Image import Image
 
-from .picture import PictureScene
+from .picture_scene import PictureScene
 from .view import CONTACT, GRID, OBJECT, RAY_HIT, RAY_MISSED, Colour, Stage, ghost_colours
 
 if TYPE_CHECKING:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,11 +12,9 @@ from scipy.spatial.transform import RigidTransform
 from ...recognizer import Contacts, Hypothesis, Polyhedron
 from ..scene.scene import OBJECT
 from ..sensors.touch import Touch
-from .picture import Ghost, PictureScene
+from .episode import Episode
+from .picture_scene import Ghost, PictureScene
 from .rivals import Likeness, ghost_of, leading_rivals
-
-if TYPE_CHECKING:
-    from ..probe_env import ProbeEnv
 
 __all__ = [
     "bare_scene",
@@ -38,30 +35,32 @@ FEW_RAYS = 12
 
 
 def episode_picture(
-    env: ProbeEnv, rivals: Sequence[tuple[Hypothesis, str]], title: str, subtitle: str
+    episode: Episode, rivals: Sequence[tuple[Hypothesis, str]], title: str, subtitle: str
 ) -> PictureScene:
     """What an episode looks like at its end.
 
     Args:
-        env: the environment after its last step.
+        episode: as it stands after the last probe.
         rivals: hypotheses to show as ghosts, each with its line in the legend.
         title: one line, large.
         subtitle: one line below it.
     """
-    models = {model.name: model for model in env.library}
-    ghosts = tuple(ghost_of(hypothesis, models, label) for hypothesis, label in rivals)
-    scene = _with_rays(_scene(env, ghosts), env.touches, RAY_LENGTH * env.true_object.diameter)
+    models = likeness_of(episode).library
+    ghosts = [ghost_of(hypothesis, models, label) for hypothesis, label in rivals]
+    length = RAY_LENGTH * episode.true_object.diameter
+    scene = _with_rays(_scene(episode, ghosts), episode.touches, length)
     return replace(scene, title=title, subtitle=subtitle)
 
 
-def episode_so_far(env: ProbeEnv) -> PictureScene:
+def episode_so_far(episode: Episode) -> PictureScene:
     """What an episode looks like on the way: the last probe, all contacts, the leading rivals."""
-    likeness, truth = likeness_of(env), (env.true_object.name, env.T_world_object)
-    rivals = leading_rivals(env.belief, likeness, truth, MOST_RIVALS)
-    ghosts = tuple(ghost_of(rival, likeness.library, rival.object_name) for rival in rivals)
-    many = bool(env.touches) and len(env.touches[-1].outcomes) > FEW_RAYS
-    length = (0.05 if many else RAY_LENGTH) * env.true_object.diameter
-    scene = _with_rays(_scene(env, ghosts), env.touches[-1:], length)
+    likeness = likeness_of(episode)
+    truth = episode.true_object.name, episode.T_world_object
+    rivals = leading_rivals(episode.belief, likeness, truth, MOST_RIVALS)
+    ghosts = [ghost_of(rival, likeness.library, rival.object_name) for rival in rivals]
+    many = bool(episode.touches) and len(episode.touches[-1].outcomes) > FEW_RAYS
+    length = (0.05 if many else RAY_LENGTH) * episode.true_object.diameter
+    scene = _with_rays(_scene(episode, ghosts), episode.touches[-1:], length)
     if many:
         missed = ~scene.ray_hits
         rays = {"rays_world": scene.rays_world[missed], "ray_hits": scene.ray_hits[missed]}
@@ -69,12 +68,12 @@ def episode_so_far(env: ProbeEnv) -> PictureScene:
     return scene
 
 
-def likeness_of(env: ProbeEnv) -> Likeness:
-    """Tells which hypotheses of an environment look the same."""
+def likeness_of(episode: Episode) -> Likeness:
+    """Tells which hypotheses of an episode look the same."""
     return Likeness(
-        {model.name: model for model in env.library},
-        env.recognizer.tolerance,
-        float(env.contacts.position_error.max(initial=0.0)),
+        {model.name: model for model in episode.library},
+        episode.tolerance,
+        float(episode.contacts.position_error.max(initial=0.0)),
     )
 
 
@@ -103,8 +102,8 @@ def last_stretch(touch: Touch, length: float) -> Floats:
     return np.stack([touch.ends_world - short, touch.ends_world], axis=1)
 
 
-def _scene(env: ProbeEnv, ghosts: Sequence[Ghost]) -> PictureScene:
-    return bare_scene(env.true_object, env.T_world_object, env.contacts, ghosts)
+def _scene(episode: Episode, ghosts: Sequence[Ghost]) -> PictureScene:
+    return bare_scene(episode.true_object, episode.T_world_object, episode.contacts, ghosts)
 
 
 def _with_rays(scene: PictureScene, touches: Sequence[Touch], length: float) -> PictureScene:

@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
 from . import view as look
 from .caption import Caption, add_caption, belief_text, length_text
+from .episode import Episode
 from .episode_picture import episode_so_far
+from .picture_scene import PictureScene
 from .renderer import Renderer
 from .window import Window
-
-if TYPE_CHECKING:
-    from ..probe_env import ProbeEnv
-    from .picture import PictureScene
 
 __all__ = ["EpisodeView"]
 
@@ -27,7 +23,7 @@ ROOM = 1.12
 
 
 class EpisodeView:
-    """Draws an environment, for as long as the environment lives, always from the same place."""
+    """Draws an environment's episodes, for as long as it lives, always from the same place."""
 
     def __init__(self, mode: str) -> None:
         """Prepare to draw; nothing starts and no window opens yet.
@@ -42,20 +38,20 @@ class EpisodeView:
         self._renderer = Renderer()
         self._stage: look.Stage | None = None
 
-    def picture(self, env: ProbeEnv) -> NDArray[np.uint8]:
+    def picture(self, episode: Episode) -> NDArray[np.uint8]:
         """The episode so far, (600, 800, 3)."""
-        scene = episode_so_far(env)
+        scene = episode_so_far(episode)
         corners = scene.object_vertices_world
-        fresh = not env.touches  # an episode begins: its object lies elsewhere
+        fresh = not episode.touches  # an episode begins: its object lies elsewhere
         if self._stage is None or fresh or not self._stage.holds(corners, SIZE):
             self._stage = look.Stage.of(scene, SIZE, ROOM)
         picture = self._renderer.draw(scene, self._stage, SIZE)
-        return np.array(add_caption(picture, _caption(env, scene, self._stage)))
+        return np.array(add_caption(picture, _caption(episode, scene, self._stage)))
 
-    def show(self, env: ProbeEnv) -> None:
+    def show(self, episode: Episode) -> None:
         """Show the picture in the window, if there is one."""
         if self._window is not None:
-            self._window.show(self.picture(env))
+            self._window.show(self.picture(episode))
 
     def close(self) -> None:
         """End the renderer and close the window; both may have been already."""
@@ -64,11 +60,11 @@ class EpisodeView:
             self._window.close()
 
 
-def _caption(env: ProbeEnv, scene: PictureScene, stage: look.Stage) -> Caption:
-    number = len(env.touches)
-    title = f"Probe {number}" if number else f"An unknown object, one of {len(env.library)}"
+def _caption(episode: Episode, scene: PictureScene, stage: look.Stage) -> Caption:
+    number = len(episode.touches)
+    title = f"Probe {number}" if number else f"An unknown object, one of {len(episode.library)}"
     rivals = [(colour, f"maybe {name}") for name, colour in look.ghost_colours(scene).items()]
     fixed = [(look.OBJECT, "the true object"), (look.CONTACT, "contact, felt normal")]
     fixed += [(look.RAY_HIT, "touched"), (look.RAY_MISSED, "touched nothing")]
     fixed.append((look.GRID, f"grid {length_text(stage.step)}"))
-    return Caption(title, belief_text(env.belief), (tuple(rivals), tuple(fixed)), LETTERS)
+    return Caption(title, belief_text(episode.belief), (tuple(rivals), tuple(fixed)), LETTERS)

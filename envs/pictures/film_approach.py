@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..scene.scene import OBJECT
 from ..sensors.touch import Touch
 from .episode_picture import last_stretch
-from .picture import Tip
+from .picture_scene import Tip
 
 __all__ = ["FEW_RAYS", "Moment", "Timing", "approach", "seconds_of"]
 

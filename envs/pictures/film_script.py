@@ -8,23 +8,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.spatial.transform import RigidTransform
 
-from ...recognizer import Belief, Contacts, Polyhedron
+from ...recognizer import Contacts
 from ..sensors.touch import Touch
 from . import view as look
 from .caption import Caption, belief_text, length_text
-from .episode_picture import bare_scene
+from .episode import Episode
+from .episode_picture import bare_scene, likeness_of
 from .film_approach import approach, seconds_of
-from .picture import PictureScene
-from .rivals import Cast, Likeness, Shown, ghost_of
+from .picture_scene import PictureScene
+from .rivals import Cast, Shown, ghost_of
 
-__all__ = ["FRAME_RATE", "EpisodeRecord", "FilmScript", "Probed", "Shot"]
-
-Floats = NDArray[np.float64]
+__all__ = ["FRAME_RATE", "EpisodeRecord", "FilmScript", "Shot"]
 
 FRAME_RATE = 25
 LETTERS = 1.35
@@ -39,26 +37,13 @@ LONGEST = 40.0
 
 
 @dataclass(frozen=True, eq=False)
-class Probed:
-    """One probe of an episode, and what was so after it."""
-
-    touch: Touch
-    contacts: Contacts
-    """All that counted after it."""
-    belief: Belief | None
-    T_world_object: RigidTransform
-
-
-@dataclass(frozen=True, eq=False)
 class EpisodeRecord:
     """What a film is made of."""
 
-    model: Polyhedron
-    """What the object truly is."""
-    T_world_object: RigidTransform
-    """Where it lay at first."""
-    probes: tuple[Probed, ...]
-    likeness: Likeness
+    start: Episode
+    """As it stood before the first probe."""
+    probes: tuple[Episode, ...]
+    """As it stood after each probe."""
     verdict: tuple[str, str]
     """What came of it: a line, and a line below it."""
 
@@ -84,44 +69,39 @@ class FilmScript:
             every: for how many frames a picture is shown at least.
         """
         self._record, self._every = record, every
+        self._states = record.start, *record.probes
+        self._model = record.start.true_object
+        likeness = likeness_of(self._states[-1])
+        self._library = likeness.library
         self._casts = [Cast()]
-        for probed in record.probes:
-            truth = record.model.name, probed.T_world_object
-            self._casts.append(self._casts[-1].next(probed.belief, record.likeness, truth))
+        for state in record.probes:
+            truth = self._model.name, state.T_world_object
+            self._casts.append(self._casts[-1].next(state.belief, likeness, truth))
         self.stage = look.Stage.of(self._everything(), size, ROOM)
         """The camera and the plane of all pictures."""
-        usual = sum(seconds_of(probed.touch) + FADE + REST for probed in record.probes)
+        usual = sum(seconds_of(state.touches[-1]) + FADE + REST for state in record.probes)
         self._pace = min(1.0, LONGEST / max(usual, 1e-9))
 
     def shots(self) -> Iterator[Shot]:
         """All pictures."""
-        record, pose, contacts = self._record, self._record.T_world_object, Contacts.none()
-        among = f"one of {len(record.likeness.library)} that palpate knows"
+        among = f"one of {len(self._library)} that palpate knows"
         told = (f"An unknown object, {among}", "Shown as it truly lies, which palpate is not told")
-        yield self._still(pose, contacts, Cast(), told, OPENING)
-        belief = None
-        for number, probed in enumerate(record.probes, 1):
-            before, after = self._casts[number - 1 : number + 1]
-            title = f"Probe {number} of {len(record.probes)}"
-            yield from self._approach(pose, contacts, before, probed, (title, belief_text(belief)))
-            pose, contacts, belief = probed.T_world_object, probed.contacts, probed.belief
-            yield from self._fade(number, after, (title, belief_text(belief)))
-        yield self._still(pose, contacts, self._casts[-1], record.verdict, ENDING)
+        yield self._still(self._states[0], Cast(), told, OPENING)
+        for number, (before, after) in enumerate(pairwise(self._states), 1):
+            title = f"Probe {number} of {len(self._record.probes)}"
+            told = title, belief_text(before.belief)
+            yield from self._approach(before, after.touches[-1], self._casts[number - 1], told)
+            yield from self._fade(after, self._casts[number], (title, belief_text(after.belief)))
+        yield self._still(self._states[-1], self._casts[-1], self._record.verdict, ENDING)
 
     def _approach(
-        self,
-        pose: RigidTransform,
-        contacts: Contacts,
-        cast: Cast,
-        probed: Probed,
-        told: tuple[str, str],
+        self, before: Episode, touch: Touch, cast: Cast, told: tuple[str, str]
     ) -> Iterator[Shot]:
-        still = self._still(pose, contacts, cast, told, 0.0)
-        new = probed.touch.contacts
-        felt = bare_scene(self._record.model, pose, new)
-        positions = np.concatenate([contacts.positions, new.positions])
-        for moment in approach(probed.touch, self.stage.view.radius, self._pictures):
-            seen = np.append(np.ones(len(contacts), bool), moment.growth > 0.0)
+        still = self._still(before, cast, told, 0.0)
+        felt = bare_scene(self._model, before.T_world_object, touch.contacts)
+        positions = np.concatenate([before.contacts.positions, felt.contacts_world])
+        for moment in approach(touch, self.stage.view.radius, self._pictures):
+            seen = np.append(np.ones(len(before.contacts), bool), moment.growth > 0.0)
             grown = felt.normals_world * moment.growth[:, None]
             scene = replace(
                 still.scene,
@@ -133,54 +113,48 @@ class FilmScript:
             )
             yield Shot(scene, still.caption, self._every)
 
-    def _fade(self, number: int, cast: Cast, told: tuple[str, str]) -> Iterator[Shot]:
+    def _fade(self, after: Episode, cast: Cast, told: tuple[str, str]) -> Iterator[Shot]:
         """Rivals go and come after a probe; its rays stay in the picture."""
-        probed = self._record.probes[number - 1]
-        *_, last = approach(probed.touch, self.stage.view.radius, lambda _: 1)
+        *_, last = approach(after.touches[-1], self.stage.view.radius, lambda _: 1)
         changes = bool(cast.gone or cast.new)
         count = self._pictures(FADE) if changes else 1
         rest = max(round(REST * self._pace * FRAME_RATE), 1)
         for step in range(1, count + 1):
             share = step / count if changes else 1.0
-            still = self._still(probed.T_world_object, probed.contacts, cast, told, 0.0, share)
+            still = self._still(after, cast, told, 0.0, share)
             scene = replace(still.scene, rays_world=last.rays_world, ray_hits=last.ray_hits)
             yield Shot(scene, still.caption, self._every + (rest if step == count else 0))
 
     def _still(
         self,
-        pose: RigidTransform,
-        contacts: Contacts,
+        state: Episode,
         cast: Cast,
         told: tuple[str, str],
         seconds: float,
         share: float = 1.0,
     ) -> Shot:
         """A picture without a probe; ``share`` is how far rivals have come and gone."""
-        model, library = self._record.model, self._record.likeness.library
         opacities = [(one, 1.0) for one in cast.stayed]
         if share < 1.0:
             opacities += [(one, 1.0 - share) for one in cast.gone]
         opacities += [(one, share) for one in cast.new]
         ghosts = [
-            ghost_of(one.rival, library, str(one.colour), one.colour, opacity)
+            ghost_of(one.rival, self._library, str(one.colour), one.colour, opacity)
             for one, opacity in opacities
         ]
-        scene = bare_scene(model, pose, contacts, ghosts)
+        scene = bare_scene(self._model, state.T_world_object, state.contacts, ghosts)
         legend = (self._rivals_legend(cast, share), self._fixed_legend())
         return Shot(scene, Caption(*told, legend, LETTERS), round(seconds * FRAME_RATE))
 
     def _everything(self) -> PictureScene:
         """All that the film shows of object, contacts and rivals, in one scene."""
-        record = self._record
-        poses = [record.T_world_object, *(probed.T_world_object for probed in record.probes)]
-        felt = Contacts.join(
-            [Contacts.none(), *(probed.touch.contacts for probed in record.probes)]
-        )
+        touched = [state.touches[-1].contacts for state in self._record.probes]
+        felt = Contacts.join([Contacts.none(), *touched])
         rivals = [one.rival for cast in self._casts for one in cast.new]
-        ghosts = [ghost_of(rival, record.likeness.library, "") for rival in rivals]
-        scene = bare_scene(record.model, record.T_world_object, felt, ghosts)
-        corners = np.concatenate([pose.apply(record.model.vertices) for pose in poses])
-        return replace(scene, object_vertices_world=corners)
+        ghosts = [ghost_of(rival, self._library, "") for rival in rivals]
+        scene = bare_scene(self._model, self._states[0].T_world_object, felt, ghosts)
+        corners = [state.T_world_object.apply(self._model.vertices) for state in self._states]
+        return replace(scene, object_vertices_world=np.concatenate(corners))
 
     def _pictures(self, seconds: float) -> int:
         return max(round(seconds * self._pace * FRAME_RATE / self._every), 1)

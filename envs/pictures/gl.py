@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from . import view as look
-from .picture import PictureScene, Tip
+from .picture_scene import PictureScene, Tip
 
 __all__ = ["GlPainter", "serve"]
 

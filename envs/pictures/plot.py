@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from . import view as look
-from .picture import PictureScene, Tip
+from .picture_scene import PictureScene, Tip
 from .raster import Layer, blend, see, see_faces
 
 __all__ = ["PlotPainter"]

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .picture import PictureScene
+from .picture_scene import PictureScene
 from .view import Stage
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform
 
 from ...recognizer import Belief, Hypothesis, Polyhedron, PoseTolerance, pose_difference
-from .picture import Ghost
+from .picture_scene import Ghost
 
 __all__ = ["Likeness", "ghost_of", "leading_rivals"]
 

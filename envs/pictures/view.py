@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from .picture import PictureScene
+from .picture_scene import PictureScene
 
 __all__ = [
     "CONTACT",

@@ -9,7 +9,7 @@ from time import perf_counter, process_time
 import numpy as np
 from numpy.typing import NDArray
 
-from ...envs.pictures.film_script import Probed
+from ...envs.pictures.episode import Episode
 from ...envs.probe_env import REACH, ProbeEnv
 from ...envs.sensors.ball_sensor import BallSensor
 from ...envs.sensors.finger_sensor import FingerSensor
@@ -89,8 +89,8 @@ def make_env(setting: Setting) -> ProbeEnv:
     )
 
 
-def probes(env: ProbeEnv, policy: Policy, seed: int) -> Iterator[Probed]:
-    """Play an episode until the environment ends it, probe by probe.
+def probes(env: ProbeEnv, policy: Policy, seed: int) -> Iterator[Episode]:
+    """Play an episode until the environment ends it; how it stands after each probe.
 
     Args:
         env: its episode starts when the first probe is asked for.
@@ -104,7 +104,7 @@ def probes(env: ProbeEnv, policy: Policy, seed: int) -> Iterator[Probed]:
     while not ended:
         observation, _, terminated, truncated, _ = env.step(policy.act(observation, rng))
         ended = terminated or truncated
-        yield Probed(env.touches[-1], env.contacts, env.belief, env.T_world_object)
+        yield env.episode
 
 
 @dataclass

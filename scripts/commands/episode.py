@@ -186,20 +186,18 @@ def _play(
     """Play an episode and tell it; the record of it, and what was ruled out, the latest first."""
     import numpy as np
 
-    from ...envs.pictures.episode_picture import likeness_of
-    from ...envs.pictures.film_script import EpisodeRecord, Probed
+    from ...envs.pictures.film_script import EpisodeRecord
     from ..benchmark.playing import probes
 
     console.print(
         f"{'probe':<8}  {'its rays met':<20}  interpretations  hypotheses left", style="dim"
     )
     env.reset(seed=seed)  # as `probes` does
-    began_at = env.T_world_object
-    probed: list[Probed] = []
+    states = [env.episode]
     ruled_out: list[tuple[Hypothesis, str]] = []
     before = env.belief
     for one in probes(env, chooser, seed):
-        probed.append(one)
+        states.append(one)
         console.print(probe_line(len(env.touches), env.touches[-1], env.belief))
         moved = env.touches[-1].displacement
         if moved.distance > TOLD_PUSH:
@@ -211,12 +209,7 @@ def _play(
         if before and env.belief and before is not env.belief:
             ruled_out = _ruled_out(env, before, env.belief) + ruled_out
         before = env.belief
-    return (
-        EpisodeRecord(
-            env.true_object, began_at, tuple(probed), likeness_of(env), verdict_in_short(env)
-        ),
-        ruled_out,
-    )
+    return EpisodeRecord(states[0], tuple(states[1:]), verdict_in_short(env)), ruled_out
 
 
 def _tell_strays(env: ProbeEnv, console: Console) -> None:
@@ -233,7 +226,7 @@ def _ruled_out(env: ProbeEnv, before: Belief, after: Belief) -> list[tuple[Hypot
     """The heaviest hypotheses of one belief that no hypothesis of the next resembles."""
     from ...envs.pictures.episode_picture import likeness_of
 
-    likeness, gone = likeness_of(env), []
+    likeness, gone = likeness_of(env.episode), []
     for old in before.hypotheses:
         if len(gone) < MOST_GHOSTS and not likeness.any_alike(
             old.object_name, old.pose, after.hypotheses
@@ -288,9 +281,9 @@ def _draw(
     rivals = [(rival, f"{rival.object_name}, still possible") for rival in alive]
     summary = "recognised" if belief and belief.unique else "not unique yet"
     scene = episode_picture(
-        env,
+        env.episode,
         (rivals + ruled_out)[:MOST_GHOSTS],
-        title=f"{env.true_object.name}: {summary}",
+        title=f"{env.episode.true_object.name}: {summary}",
         subtitle=f"{count(len(env.touches), 'probe')},"
         f" {count(len(env.contacts), 'contact')} on the object",
     )

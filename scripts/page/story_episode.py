@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...envs.pictures.episode_picture import RAY_LENGTH, last_stretch, likeness_of
+from ...envs.pictures.episode_picture import RAY_LENGTH, last_stretch
 from ...envs.pictures.film_script import EpisodeRecord
 from ...envs.probe_env import ProbeEnv
 from ...envs.scene.scene import NOTHING, OBJECT, PLANE
@@ -40,8 +40,7 @@ def episode_stories(env: ProbeEnv, policy: Policy, seed: int) -> Iterator[Story]
         seed: of the episode.
     """
     env.reset(seed=seed)  # as `probes` will, to the bit
-    likeness = likeness_of(env)
-    record = EpisodeRecord(env.true_object, env.T_world_object, (), likeness, ("", ""))
+    record = EpisodeRecord(env.episode, (), ("", ""))
     moments = (_untouched(record),)
     yield _story(record, moments)
     for number, probed in enumerate(probes(env, policy, seed), 1):
@@ -54,32 +53,32 @@ def episode_stories(env: ProbeEnv, policy: Policy, seed: int) -> Iterator[Story]
 def _story(
     record: EpisodeRecord, moments: tuple[Moment, ...], ending: tuple[str, str] = ("", "")
 ) -> Story:
-    library = tuple(record.likeness.library.values())
+    library = record.start.library
     return Story(
         title="An unknown object",
         subtitle=f"one of {len(library)} that palpate knows; each touch rules some out",
         models=library,
         moments=moments,
         ending=ending,
-        truth=record.model.name,
+        truth=record.start.true_object.name,
         plane=0.0,
     )
 
 
 def _untouched(record: EpisodeRecord) -> Moment:
     told = "every object at every pose is possible"
-    begun = record.T_world_object.as_matrix()
+    begun = record.start.T_world_object.as_matrix()
     nothing = Contacts.none()
     return Moment("Before the first probe", told, Ways.none(), nothing, 0, None, begun)
 
 
 def _moment(record: EpisodeRecord, number: int) -> Moment:
     probed = record.probes[number - 1]
-    touch = probed.touch
+    touch = probed.touches[-1]
     return Moment(
         f"Probe {number}",
         _met(touch),
-        _ways(touch, RAY_LENGTH * record.model.diameter),
+        _ways(touch, RAY_LENGTH * probed.true_object.diameter),
         probed.contacts,
         min(len(touch.contacts), len(probed.contacts)),
         probed.belief,

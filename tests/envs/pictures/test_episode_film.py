@@ -22,12 +22,11 @@ from palpate.envs.pictures.film_script import (
     OPENING,
     EpisodeRecord,
     FilmScript,
-    Probed,
 )
 from palpate.envs.pictures.rivals import leading_rivals
 from palpate.envs.pictures.video import Video, check_video_path
 from palpate.envs.probe_env import ProbeEnv
-from palpate.envs.scene.scene.scene import OBJECT
+from palpate.envs.scene.scene import OBJECT
 
 SIZE = 320, 240
 
@@ -35,14 +34,13 @@ SIZE = 320, 240
 def record_of(**arguments) -> EpisodeRecord:
     env = ProbeEnv(object_name="complex-hand", **arguments)
     env.reset(seed=45)
-    start = env.T_world_object
+    start = env.episode
     rng = np.random.default_rng(np.random.SeedSequence(45).spawn(1)[0])
     probes = []
     for _ in range(2):
         env.step(rng.uniform(-1.0, 1.0, 3).astype(np.float32))
-        probes.append(Probed(env.touches[-1], env.contacts, env.belief, env.T_world_object))
-    verdict = "It is complex-hand", "2 probes"
-    return EpisodeRecord(env.true_object, start, tuple(probes), likeness_of(env), verdict)
+        probes.append(env.episode)
+    return EpisodeRecord(start, tuple(probes), ("It is complex-hand", "2 probes"))
 
 
 @pytest.fixture(scope="module")
@@ -117,8 +115,8 @@ def test_the_film_opens_and_ends_still(shots, record):
 
 def test_tips_go_along_their_rays_to_where_these_ended(shots, record):
     tips = [shot.scene.tips[0].path_world[1] for shot in shots if shot.scene.tips]
-    ends = np.concatenate([probed.touch.ends_world for probed in record.probes])
-    starts = np.concatenate([probed.touch.starts_world for probed in record.probes])
+    ends = np.concatenate([touch.ends_world for touch in record.probes[-1].touches])
+    starts = np.concatenate([touch.starts_world for touch in record.probes[-1].touches])
     for start, end in zip(starts, ends, strict=True):
         along = (end - start) / np.linalg.norm(end - start)
         on_ray = [tip for tip in tips if np.linalg.norm(np.cross(tip - end, along)) < 1e-9]
@@ -144,14 +142,15 @@ def test_contacts_come_one_by_one_and_their_normals_grow(shots, record):
 
 
 def test_rivals_that_a_probe_rules_out_fade_and_stay_away(shots, record):
-    belief = record.probes[0].belief
-    truth = record.model.name, record.T_world_object
-    leaders = leading_rivals(belief, record.likeness, truth, 3)
+    start, after = record.start, record.probes[0]
+    truth = start.true_object.name, start.T_world_object
+    likeness = likeness_of(after)
+    leaders = leading_rivals(after.belief, likeness, truth, 3)
     assert len({rival.object_name for rival in leaders}) == 3
     most = max(shots, key=lambda shot: sum(ghost.opacity for ghost in shot.scene.ghosts))
     assert len(most.scene.ghosts) == 3
     for ghost, rival in zip(most.scene.ghosts, leaders, strict=True):
-        vertices = rival.pose.apply(record.likeness.library[rival.object_name].vertices)
+        vertices = rival.pose.apply(likeness.library[rival.object_name].vertices)
         assert np.allclose(ghost.vertices_world, vertices)
     shown = [[ghost.opacity for ghost in shot.scene.ghosts if ghost.colour == 0] for shot in shots]
     opacities = [opacity[0] if opacity else 0.0 for opacity in shown]
@@ -180,15 +179,14 @@ def test_a_long_episode_is_shown_faster(record):
 
 
 def test_the_camera_stays_and_sees_an_object_that_is_moved(record):
-    shift = np.array([0.5 * record.model.diameter, 0.0, 0.0])
-    moved = type(record.T_world_object).from_components(
-        record.T_world_object.translation + shift, record.T_world_object.rotation
-    )
+    model, pose = record.start.true_object, record.start.T_world_object
+    shift = np.array([0.5 * model.diameter, 0.0, 0.0])
+    moved = type(pose).from_components(pose.translation + shift, pose.rotation)
     probes = (record.probes[0], replace(record.probes[1], T_world_object=moved))
     script = FilmScript(replace(record, probes=probes), SIZE)
     shots = list(script.shots())
-    for shot, pose in ((shots[0], record.T_world_object), (shots[-1], moved)):
-        assert np.allclose(shot.scene.object_vertices_world, pose.apply(record.model.vertices))
+    for shot, shown in ((shots[0], pose), (shots[-1], moved)):
+        assert np.allclose(shot.scene.object_vertices_world, shown.apply(model.vertices))
         assert script.stage.holds(shot.scene.object_vertices_world, SIZE)
 
 
@@ -197,10 +195,9 @@ def test_the_camera_stays_and_sees_an_object_that_is_moved(record):
 def test_every_sensor_and_placement_has_a_film(sensor, placement):
     env = ProbeEnv(("simple-hand",), sensor=sensor, placement=placement, max_probes=1)
     env.reset(seed=1)
+    start = env.episode
     env.step(np.zeros(3))
-    probed = Probed(env.touches[-1], env.contacts, env.belief, env.T_world_object)
-    likeness, start = likeness_of(env), env.T_world_object
-    record = EpisodeRecord(env.true_object, start, (probed,), likeness, ("", ""))
+    record = EpisodeRecord(start, (env.episode,), ("", ""))
     shots = list(FilmScript(record, SIZE).shots())
     tips = [shot.scene.tips for shot in shots if shot.scene.tips]
     rays = len(env.touches[-1].outcomes)
@@ -210,18 +207,17 @@ def test_every_sensor_and_placement_has_a_film(sensor, placement):
 
 
 def test_an_episode_without_a_contact_has_a_film(record):
-    free = record.probes[0].touch
-    nothing = type(record.probes[0].contacts).none()
-    missed = replace(free, contacts=nothing, outcomes=np.full(3, 2, np.int8))
-    probed = Probed(missed, nothing, None, record.T_world_object)
-    shots = list(FilmScript(replace(record, probes=(probed,)), SIZE).shots())
+    (touch,), nothing = record.probes[0].touches, record.start.contacts
+    missed = replace(touch, contacts=nothing, outcomes=np.full(3, 2, np.int8))
+    after = replace(record.start, touches=(missed,))
+    shots = list(FilmScript(replace(record, probes=(after,)), SIZE).shots())
     assert not shots[-2].scene.ray_hits.any()
     assert len(shots[-2].scene.rays_world) == 3
     assert not len(shots[-1].scene.contacts_world)
 
 
 def test_contacts_that_no_ray_tells_of_come_last(record):
-    touch = replace(record.probes[0].touch, outcomes=np.full(3, 2, np.int8))
+    touch = replace(record.probes[0].touches[0], outcomes=np.full(3, 2, np.int8))
     moments = list(approach(touch, 0.1, lambda seconds: round(10 * seconds)))
     assert [moment.growth.all() for moment in moments[-2:]] == [True, True]
     assert not any(moment.growth.any() for moment in moments[:10])

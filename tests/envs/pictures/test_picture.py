@@ -11,7 +11,8 @@ from PIL import Image
 
 from palpate.envs.pictures import renderer
 from palpate.envs.pictures import view as picture_view
-from palpate.envs.pictures.picture import Ghost, PictureScene, Tip, draw, renderer_note
+from palpate.envs.pictures.picture import draw, renderer_note
+from palpate.envs.pictures.picture_scene import Ghost, PictureScene, Tip
 from palpate.envs.pictures.renderer import Renderer
 from palpate.envs.pictures.view import Stage
 

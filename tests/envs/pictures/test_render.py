@@ -110,15 +110,15 @@ def test_rendering_survives_a_gl_library_that_kills(env, monkeypatch):
 
 def test_the_leading_rivals_are_ghosts_of_several_objects_but_never_the_truth(env):
     env.reset(seed=0)
-    assert not episode_so_far(env).ghosts
+    assert not episode_so_far(env.episode).ghosts
     env.step(ACTION)
     assert env.belief is not None
-    ghosts = episode_so_far(env).ghosts
+    ghosts = episode_so_far(env.episode).ghosts
     names = {hypothesis.object_name for hypothesis in env.belief.hypotheses}
     assert 0 < len(ghosts) <= 3
     assert len(names) == 2
     assert {ghost.label for ghost in ghosts} == names
-    truth = env.T_world_object.apply(env.true_object.vertices)
+    truth = env.episode.T_world_object.apply(env.episode.true_object.vertices)
     for ghost in ghosts:
         same = ghost.vertices_world.shape == truth.shape
         assert not (same and np.allclose(ghost.vertices_world, truth, atol=1e-3))
@@ -128,11 +128,11 @@ def test_of_many_rays_only_the_ends_that_met_nothing_are_drawn():
     env = ProbeEnv(("simple-hand",), sensor="range-grid")
     env.reset(seed=0)
     env.step(np.zeros(3))
-    scene = episode_so_far(env)
+    scene = episode_so_far(env.episode)
     assert len(env.contacts) == len(scene.contacts_world) > 3
     assert not scene.ray_hits.any()
     lengths = np.linalg.norm(scene.rays_world[:, 1] - scene.rays_world[:, 0], axis=1)
-    assert lengths.max() < 0.1 * env.true_object.diameter
+    assert lengths.max() < 0.1 * env.episode.true_object.diameter
 
 
 def test_an_environment_that_renders_can_be_pickled_and_closed_twice(env):
@@ -146,7 +146,7 @@ def test_an_environment_that_renders_can_be_pickled_and_closed_twice(env):
     if sys.platform == "linux":
         children = Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()
         commands = [Path(f"/proc/{child}/cmdline").read_text() for child in children]
-        assert not [command for command in commands if "picture_gl" in command]
+        assert not [command for command in commands if "pictures.gl" in command]
 
 
 def test_rendering_before_the_first_reset_is_refused(env):
