@@ -3,13 +3,16 @@
 The method is the interpretation tree of W. E. L. Grimson and T. Lozano-Perez, "Model-Based
 Recognition and Localization from Sparse Range or Tactile Data", MIT AI Memo 738, 1983. In order:
 
-- `polyhedron`: a mesh becomes planar faces with the solid's own symmetries;
-- `ranges`: what two points on two given faces can be to each other, tabled once a model;
+- `models`: a mesh becomes planar faces with the solid's own symmetries; an outline, edges;
+- `contacts`: what was felt and what else is known, with bounds that hold;
+- `tables`: what two points on two given faces can be to each other, once a model;
 - `tree`: a face for each contact, pruned pair by pair;
-- `pose`: the pose that an interpretation allows, or a proof that there is none;
-- `hypotheses`: interpretations with the same pose are one;
-- `recognize`: the five in a row, over a library; `solid_recognize` and `planar_recognize` run them
-  for one solid, as one compiled search, and for one outline of the plane.
+- `poses`: the pose that an interpretation allows, or a proof that there is none;
+- `beliefs`: interpretations with the same pose are one hypothesis;
+- `predict`: what a belief's poses say a probe would meet;
+- `advice`: the verdict in words, why nothing fits, which parts look alike.
+
+`recognize` runs them in a row over a library, and `belief` is what comes out.
 
 How it differs from the memo: tables are exact for concave faces too; position error enters every
 constraint, twice the bound for a difference of two points; the direction constraint's interval has
@@ -22,18 +25,23 @@ the truth for certain.
 """
 
 from .advice.diagnosis import Finding, diagnose
-from .belief import Belief, Search
+from .belief import Belief
 from .beliefs.comparison import PoseDifference, pose_difference
 from .beliefs.hypotheses import Hypothesis, PoseTolerance
+from .beliefs.search import Search
 from .contacts.contact_file import FeltFile, read_contacts
-from .contacts.contacts import ANYTHING, EDGE, FACE, VERTEX, Contacts
+from .contacts.contacts import ANYTHING, EDGE, FACE, VERTEX, ContactKind, Contacts
 from .contacts.free_space import FreeSpace
 from .contacts.support import SupportPlane
 from .models.folder import load_folder
 from .models.polygon import Polygon
 from .models.polyhedron import Polyhedron
-from .recognize import Recognizer, SearchLimits
+from .predict.pose_samples import sample_belief
+from .predict.prediction import PoseSamples, Predictions, predict
+from .predict.probes import ProbeSpace, TriadRays
+from .recognize import Recognizer
 from .tables.ranges import PairTables
+from .tree.limits import SearchLimits
 from .tree.tree import Constraints
 
 __all__ = [
@@ -43,6 +51,7 @@ __all__ = [
     "VERTEX",
     "Belief",
     "Constraints",
+    "ContactKind",
     "Contacts",
     "FeltFile",
     "Finding",
@@ -52,13 +61,19 @@ __all__ = [
     "Polygon",
     "Polyhedron",
     "PoseDifference",
+    "PoseSamples",
     "PoseTolerance",
+    "Predictions",
+    "ProbeSpace",
     "Recognizer",
     "Search",
     "SearchLimits",
     "SupportPlane",
+    "TriadRays",
     "diagnose",
     "load_folder",
     "pose_difference",
+    "predict",
     "read_contacts",
+    "sample_belief",
 ]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import IntEnum
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,8 +12,17 @@ from numpy.typing import ArrayLike, NDArray
 UNIT_NORMAL_TOLERANCE = 1e-3
 """How far from 1 the length of a given normal may be; text files round to four digits or so."""
 
-ANYTHING, FACE, EDGE, VERTEX = 0, 1, 2, 3
-"""What a contact may be on: nothing is known of it, a face, a convex edge, a convex vertex."""
+
+class ContactKind(IntEnum):
+    """What a contact may be on: nothing is known of it, a face, a convex edge, a convex vertex."""
+
+    ANYTHING = 0
+    FACE = 1
+    EDGE = 2
+    VERTEX = 3
+
+
+ANYTHING, FACE, EDGE, VERTEX = ContactKind
 
 APPROACH_ERROR = 0.01
 """How far off the direction of an approach may be, radians."""
@@ -40,7 +50,7 @@ class Contacts:
     """(n, 3) or (n, 2) unit directions in which the probe moved when it touched, world frame,
     within `APPROACH_ERROR`; rows of zeros where that is unknown. The surface faced it."""
     kinds: NDArray[np.int8]
-    """(n,) what each is on: `ANYTHING`, `FACE`, `EDGE` or `VERTEX`."""
+    """(n,) what each is on, a `ContactKind`."""
 
     def __init__(
         self,

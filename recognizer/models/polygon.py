@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.distance import pdist
 
+from .freezing import frozen
 from .planar_kernels import segment_distances
 from .polyhedron import MOST_FACES
 from .symmetry import LENGTH_TOLERANCE
@@ -46,23 +47,23 @@ class Polygon:
     @cached_property
     def segments(self) -> Floats:
         """(e, 2, 2) first and last point of each edge."""
-        return _frozen(np.stack([self.corners, np.roll(self.corners, -1, axis=0)], axis=1))
+        return frozen(np.stack([self.corners, np.roll(self.corners, -1, axis=0)], axis=1))
 
     @cached_property
     def lengths(self) -> Floats:
         """(e,) lengths of the edges, metres."""
-        return _frozen(np.linalg.norm(self.segments[:, 1] - self.segments[:, 0], axis=1))
+        return frozen(np.linalg.norm(self.segments[:, 1] - self.segments[:, 0], axis=1))
 
     @cached_property
     def normals(self) -> Floats:
         """(e, 2) outward unit normals."""
         along = (self.segments[:, 1] - self.segments[:, 0]) / self.lengths[:, None]
-        return _frozen(np.column_stack([along[:, 1], -along[:, 0]]))
+        return frozen(np.column_stack([along[:, 1], -along[:, 0]]))
 
     @cached_property
     def offsets(self) -> Floats:
         """(e,) ``normal . x`` of each edge's line, metres."""
-        return _frozen((self.normals * self.segments.mean(axis=1)).sum(axis=1))
+        return frozen((self.normals * self.segments.mean(axis=1)).sum(axis=1))
 
     @cached_property
     def diameter(self) -> float:
@@ -86,7 +87,7 @@ class Polygon:
         second = np.roll(first, -1, axis=0)
         weights = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
         middle = (weights[:, None] * (first + second)).sum(axis=0) / (3.0 * weights.sum())
-        return _frozen(self.corners[0] + middle)
+        return frozen(self.corners[0] + middle)
 
     @cached_property
     def symmetries(self) -> Floats:
@@ -103,7 +104,7 @@ class Polygon:
             turn = towards / max(abs(towards), 1e-300)
             if np.abs(turn * arms - image).max() < LENGTH_TOLERANCE * self.diameter:
                 found.append(turn)
-        return _frozen(np.array([[[t.real, -t.imag], [t.imag, t.real]] for t in found]))
+        return frozen(np.array([[[t.real, -t.imag], [t.imag, t.real]] for t in found]))
 
     @classmethod
     def from_corners(cls, corners: ArrayLike, *, name: str) -> Polygon:
@@ -145,7 +146,7 @@ class Polygon:
         if doubled < 0.0:
             # From the same first corner, the other way round.
             ring = np.roll(ring[::-1], 1, axis=0)
-        return cls(name, _frozen(np.ascontiguousarray(ring)), _largest_miss(points, kept))
+        return cls(name, frozen(np.ascontiguousarray(ring)), _largest_miss(points, kept))
 
 
 def _maximal_edges(points: Floats, slack: float) -> NDArray[np.intp]:
@@ -209,8 +210,3 @@ def _doubled_area(ring: Floats) -> float:
     first = ring - ring[0]
     second = np.roll(first, -1, axis=0)
     return float((first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]).sum())
-
-
-def _frozen(array: Floats) -> Floats:
-    array.setflags(write=False)
-    return array

@@ -7,7 +7,7 @@ import warnings
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +21,7 @@ from .faces import (
     plane_of,
     turned_against,
 )
+from .freezing import freeze, frozen
 from .symmetry import FaceSummary, rotational_symmetries
 
 if TYPE_CHECKING:
@@ -45,6 +46,13 @@ class FacePolygons:
     corners: NDArray[np.float64]
     """(c, 3) corners, object frame, metres."""
 
+    def __post_init__(self) -> None:
+        freeze(self)
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        freeze(self)
+
     @classmethod
     def of(cls, polygons: list[list[NDArray[np.float64]]]) -> FacePolygons:
         """Flatten a list of polygons a face."""
@@ -63,7 +71,7 @@ class FacePolygons:
         centres = 0.5 * (lows + np.maximum.reduceat(self.corners, firsts))
         sizes = np.diff(np.append(firsts, len(self.corners)))
         away = np.linalg.norm(self.corners - np.repeat(centres, sizes, axis=0), axis=1)
-        return np.column_stack([centres, np.maximum.reduceat(away, firsts)])
+        return frozen(np.column_stack([centres, np.maximum.reduceat(away, firsts)]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +79,7 @@ class Polyhedron:
     """A model of the library: planar faces with outward normals, in its own frame, metres.
 
     Build one with `from_mesh`. Faces may be concave and may have holes; coplanar faces that
-    don't touch are faces of their own.
+    don't touch are faces of their own. All arrays are read-only.
     """
 
     name: str
@@ -92,6 +100,13 @@ class Polyhedron:
     pieces: FacePolygons
     """Convex polygons whose union is the face."""
 
+    def __post_init__(self) -> None:
+        freeze(self)
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        freeze(self)
+
     @property
     def face_count(self) -> int:
         """How many planar faces there are."""
@@ -107,14 +122,15 @@ class Polyhedron:
         """(3,) the centre of the enclosed volume, object frame."""
         corners = self.vertices[self.triangles]
         volumes = np.linalg.det(corners)
-        return (volumes[:, None] * corners.sum(axis=1)).sum(axis=0) / (4.0 * volumes.sum())
+        middle = (volumes[:, None] * corners.sum(axis=1)).sum(axis=0) / (4.0 * volumes.sum())
+        return frozen(middle)
 
     @cached_property
     def edges(self) -> NDArray[np.float64]:
         """(e, 2, 3) the segments where two faces meet, object frame."""
         pairs = edge_neighbours(self.triangles)
         between = self.triangle_faces[pairs[:, 0]] != self.triangle_faces[pairs[:, 1]]
-        return self.vertices[pairs[between, 2:]]
+        return frozen(self.vertices[pairs[between, 2:]])
 
     @cached_property
     def symmetries(self) -> NDArray[np.float64]:
@@ -138,7 +154,7 @@ class Polyhedron:
             middles=np.array(summaries),
         )
         solid_corners = self.vertices[meets >= 3] - self.centroid
-        return rotational_symmetries(summary, solid_corners, self.diameter)
+        return frozen(rotational_symmetries(summary, solid_corners, self.diameter))
 
     @classmethod
     def from_mesh(
