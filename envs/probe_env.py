@@ -133,7 +133,7 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
     ## Rendering
     `rgb_array` gives a picture, (600, 800, 3): the object as it truly lies, the last probe's rays,
     all contacts with the normals felt, and the leading rivals as ghosts. MuJoCo's renderer draws
-    it, in a process of its own that lives until `close`; where no GL library works, matplotlib
+    it, in a process of its own that lives until `close`; where no GL library works, NumPy
     does. `human` shows it in a window after each step, by matplotlib's interactive backend.
 
     ## Arguments

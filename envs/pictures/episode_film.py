@@ -24,7 +24,7 @@ class Film:
     """A film that has been made."""
 
     renderer: str
-    """Who painted it: "MuJoCo" or "matplotlib"."""
+    """Who painted it: "MuJoCo" or "NumPy"."""
     seconds: float
     """How long it is."""
 

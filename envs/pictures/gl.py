@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from . import view as look
-from .picture_scene import PictureScene, Tip
+from .marks import Mark, marks
+from .picture_scene import PictureScene
 
 __all__ = ["GlPainter", "serve"]
 
@@ -51,7 +52,7 @@ class GlPainter:
 
     def paint(self, scene: PictureScene, stage: look.Stage, size: Size) -> NDArray[np.uint8]:
         """The picture without captions, ``(height, width, 3)``."""
-        key = look.mesh_key(scene, stage.view, size)
+        key = _mesh_key(scene, stage.view, size)
         if key != self._key:
             self._set_up(scene, stage.view, size)
             self._key = key
@@ -63,7 +64,9 @@ class GlPainter:
         target = self._renderer.scene
         target.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = False
         target.flags[mujoco.mjtRndFlag.mjRND_REFLECTION] = False
-        _add_shapes(target, scene, stage)
+        _add_plane(target, stage.ruled, 0.0005 * stage.view.radius)
+        for mark in marks(scene, stage):
+            _add_mark(target, mark)
         return np.asarray(Image.fromarray(self._renderer.render()).reduce(OVERSAMPLING))
 
     def _set_up(self, scene: PictureScene, view: look.View, size: Size) -> None:
@@ -75,6 +78,15 @@ class GlPainter:
         self._data = mujoco.MjData(self._model)
         mujoco.mj_forward(self._model, self._data)
         self._renderer = mujoco.Renderer(self._model, height, width, max_geom=MOST_SHAPES)
+
+
+def _mesh_key(scene: PictureScene, view: look.View, size: tuple[int, int]) -> bytes:
+    """Differs where the meshes of a scene, their colours, the camera or the picture's size do."""
+    meshes = [(scene.object_vertices_world, scene.object_triangles)]
+    meshes += [(ghost.vertices_world, ghost.triangles) for ghost in scene.ghosts]
+    facts = np.array([*view.numbers, *size, *np.ravel([*look.ghost_colours(scene).values()])])
+    arrays = [facts, *(array for mesh in meshes for array in mesh)]
+    return b"".join(str(array.shape).encode() + array.tobytes() for array in arrays)
 
 
 def _compile(scene: PictureScene, view: look.View, width: int, height: int) -> mujoco.MjModel:
@@ -96,11 +108,9 @@ def _compile(scene: PictureScene, view: look.View, width: int, height: int) -> m
         width=256,
         height=256,
     )
-    right, up, back = view.axes
-    sun = -(0.75 * up - 0.5 * right + 0.35 * back)
     spec.worldbody.add_light(
         type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
-        dir=sun,
+        dir=-view.towards_light,
         diffuse=[0.40, 0.40, 0.40],
         specular=[0.05, 0.05, 0.05],
         castshadow=False,
@@ -144,62 +154,23 @@ def _camera(view: look.View) -> mujoco.MjvCamera:
     return camera
 
 
-def _add_shapes(target: mujoco.MjvScene, scene: PictureScene, stage: look.Stage) -> None:
-    unit, size = stage.view.radius, look.mark_size(scene)
-    _add_plane(target, stage.ruled, 0.0005 * unit)
-    for line in stage.ruled:
-        _add_line(target, line, 0.0015 * unit, look.GRID)
-    for edge in scene.object_edges_world:
-        _add_line(target, edge, 0.0035 * unit, look.EDGE)
-    colours = look.ghost_colours(scene)
-    for ghost in scene.ghosts:
-        colour = colours[ghost.label]
-        for edge in look.sharp_edges(ghost.vertices_world, ghost.triangles):
-            _add_line(target, edge, 0.0025 * unit, colour, alpha=ghost.opacity)
-    for ray, hit in zip(look.shown_rays(scene, stage.view), scene.ray_hits, strict=True):
-        colour = look.RAY_HIT if hit else look.RAY_MISSED
-        _add_line(target, ray, (0.0045 if hit else 0.003) * unit, colour)
-        if not hit:
-            _add_ball(target, ray[1], 0.012 * unit, colour)
-    for tip in scene.tips:
-        _add_tip(target, tip, unit)
-    for contact, normal in zip(scene.contacts_world, scene.normals_world, strict=True):
-        _add_ball(target, contact, 0.024 * size * unit, look.CONTACT)
-        if normal.any():
-            # Twice the length: MuJoCo draws an arrow to half of where it says that it ends.
-            end = contact + 2 * look.NORMAL_LENGTH * size * unit * normal
-            arrow = mujoco.mjtGeom.mjGEOM_ARROW
-            _add_line(target, np.stack([contact, end]), 0.010 * size * unit, look.CONTACT, arrow)
-
-
-def _add_tip(target: mujoco.MjvScene, tip: Tip, unit: float) -> None:
-    """A ball and what it sweeps; of a point its line, and a dot that can be seen."""
-    _add_line(target, tip.path_world, 0.0045 * unit, look.RAY_HIT)
-    if tip.radius > 0.0:
-        _add_line(target, tip.path_world, tip.radius, look.RAY_HIT, alpha=0.25)
-    _add_ball(target, tip.path_world[1], tip.radius or look.POINT_SIZE * unit, look.RAY_HIT)
-
-
 def _add_plane(target: mujoco.MjvScene, lines: Floats, thickness: float) -> None:
     low, high = lines.min(axis=(0, 1)), lines.max(axis=(0, 1))
     half = (high - low) / 2 + [0, 0, thickness]
     _add(target, mujoco.mjtGeom.mjGEOM_BOX, half, (low + high) / 2, look.PLANE, 0.55)
 
 
-def _add_ball(target: mujoco.MjvScene, centre: Floats, radius: float, colour: look.Colour) -> None:
-    _add(target, mujoco.mjtGeom.mjGEOM_SPHERE, np.full(3, radius), centre, colour)
-
-
-def _add_line(
-    target: mujoco.MjvScene,
-    ends: Floats,
-    radius: float,
-    colour: look.Colour,
-    kind: mujoco.mjtGeom = mujoco.mjtGeom.mjGEOM_CAPSULE,
-    alpha: float = 1.0,
-) -> None:
-    geom = _add(target, kind, np.ones(3), np.zeros(3), colour, alpha)
-    mujoco.mjv_connector(geom, kind, radius, ends[0], ends[1])
+def _add_mark(target: mujoco.MjvScene, mark: Mark) -> None:
+    start, end = mark.ends_world
+    kind = mujoco.mjtGeom.mjGEOM_SPHERE
+    geom = _add(target, kind, np.full(3, mark.radius), start, mark.colour, mark.opacity)
+    if (start == end).all():
+        return
+    kind = mujoco.mjtGeom.mjGEOM_CAPSULE
+    if mark.arrow:
+        kind = mujoco.mjtGeom.mjGEOM_ARROW
+        end = 2.0 * end - start  # MuJoCo draws an arrow to half of where it says that it ends
+    mujoco.mjv_connector(geom, kind, mark.radius, start, end)
 
 
 def _add(

@@ -21,7 +21,7 @@ def draw(scene: PictureScene, path: str | Path, size: tuple[int, int] = (1280, 9
     The file appears whole or not at all. ``MUJOCO_GL`` is respected where it is set.
 
     Returns:
-        Who drew it: ``"MuJoCo"`` or ``"matplotlib"``.
+        Who drew it: ``"MuJoCo"`` or ``"NumPy"``.
 
     Raises:
         ValueError: ``path`` does not end in ``.png``, or its folder does not exist.

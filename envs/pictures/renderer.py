@@ -1,4 +1,4 @@
-"""Who paints pictures: MuJoCo in a process of its own, or matplotlib where no GL library works.
+"""Who paints pictures: MuJoCo in a process of its own, or NumPy where no GL library works.
 
 A missing or broken GL library may kill the process that tries it, so none is tried in this one.
 """
@@ -12,16 +12,14 @@ import sys
 import weakref
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .picture_scene import PictureScene
+from .software import paint
 from .view import Stage
-
-if TYPE_CHECKING:
-    from .plot import PlotPainter
 
 __all__ = ["Renderer"]
 
@@ -43,12 +41,12 @@ class Renderer:
     def __init__(self) -> None:
         self._untried = _gl_environments()
         self._process: _GlProcess | None = None
-        self._plot: PlotPainter | None = None
+        self._name = "MuJoCo"
 
     @property
     def name(self) -> str:
-        """Who painted last: "MuJoCo" or "matplotlib"."""
-        return "MuJoCo" if self._plot is None else "matplotlib"
+        """Who painted last: "MuJoCo" or "NumPy"."""
+        return self._name
 
     def draw(self, scene: PictureScene, stage: Stage, size: Size) -> NDArray[np.uint8]:
         """The picture without captions, ``(height, width, 3)``; ``size`` is (width, height)."""
@@ -59,11 +57,8 @@ class Renderer:
                 return self._process.draw(scene, stage, size)
             except (OSError, EOFError):
                 self._end_process()
-        if self._plot is None:
-            from .plot import PlotPainter
-
-            self._plot = PlotPainter()
-        return self._plot.paint(scene, stage, size)
+        self._name = "NumPy"
+        return paint(scene, stage, size)
 
     def close(self) -> None:
         """End the process; a later `draw` starts another."""

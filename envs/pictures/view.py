@@ -24,10 +24,6 @@ __all__ = [
     "frame",
     "ghost_colours",
     "grid",
-    "mark_size",
-    "mesh_key",
-    "sharp_edges",
-    "shown_rays",
 ]
 
 Floats = NDArray[np.float64]
@@ -53,8 +49,6 @@ FIELD_OF_VIEW = np.radians(28.0)  # vertical; narrow, so that parallel edges loo
 ELEVATION = np.radians(-30.0)
 FILLED_WIDTH, FILLED_HEIGHT = 0.86, 0.70  # the share of the picture left to the object by captions
 
-POINT_SIZE = 0.02  # radius of a dot that stands for a point, in the same units
-FEW_CONTACTS = 15  # up to which their marks have the full size
 NORMAL_LENGTH = 0.21  # of a normal's arrow, in units of the view's radius
 
 
@@ -86,13 +80,23 @@ class View:
         """``(3, 3)`` rows: right, up and towards the viewer, world frame."""
         return _axes(self.azimuth, self.elevation)
 
+    @property
+    def towards_light(self) -> Floats:
+        """``(3,)`` from above, a little from the left and from behind the viewer; world frame."""
+        right, up, back = self.axes
+        return 0.75 * up - 0.5 * right + 0.35 * back
+
     def project(self, points_world: Floats, size: tuple[int, int]) -> Floats:
         """``(..., 3)``: pixels right of and below the top left corner, and depth in metres."""
         width, height = size
         right, up, back = np.moveaxis((points_world - self.centre) @ self.axes.T, -1, 0)
         depth = self.distance - back
-        scale = height / 2 / np.tan(FIELD_OF_VIEW / 2) / depth
+        scale = self.pixels_per_metre(size) / depth
         return np.stack([width / 2 + right * scale, height / 2 - up * scale, depth], axis=-1)
+
+    def pixels_per_metre(self, size: tuple[int, int]) -> float:
+        """How large a metre is at a depth of one metre."""
+        return size[1] / 2 / float(np.tan(FIELD_OF_VIEW / 2))
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,28 +163,6 @@ def ghost_colours(scene: PictureScene) -> dict[str, Colour]:
     return {label: GHOSTS[number % len(GHOSTS)] for label, number in numbers.items()}
 
 
-def mesh_key(scene: PictureScene, view: View, size: tuple[int, int]) -> bytes:
-    """Differs where the meshes of a scene, their colours, the camera or the picture's size do."""
-    meshes = [(scene.object_vertices_world, scene.object_triangles)]
-    meshes += [(ghost.vertices_world, ghost.triangles) for ghost in scene.ghosts]
-    facts = np.array([*view.numbers, *size, *np.ravel([*ghost_colours(scene).values()])])
-    arrays = [facts, *(array for mesh in meshes for array in mesh)]
-    return b"".join(str(array.shape).encode() + array.tobytes() for array in arrays)
-
-
-def mark_size(scene: PictureScene) -> float:
-    """How large marks of contacts are drawn, 1 but where so many would hide all else."""
-    return float(np.clip(np.sqrt(FEW_CONTACTS / max(len(scene.contacts_world), 1)), 0.4, 1.0))
-
-
-def shown_rays(scene: PictureScene, view: View) -> Floats:
-    """``(r, 2, 3)`` the last stretch of each ray: where it began is far off and tells nothing."""
-    start, end = scene.rays_world[:, 0], scene.rays_world[:, 1]
-    length = np.linalg.norm(end - start, axis=1, keepdims=True)
-    kept = np.minimum(1.0, 0.9 * view.radius / np.maximum(length, 1e-12))
-    return np.stack([end + (start - end) * kept, end], axis=1)
-
-
 def grid(scene: PictureScene, view: View) -> tuple[Floats, float]:
     """``(g, 2, 3)`` lines ruled on the plane under the scene, and the step between them.
 
@@ -196,25 +178,6 @@ def grid(scene: PictureScene, view: View) -> tuple[Floats, float]:
     lines = [[(x, low[1]), (x, high[1])] for x in xs] + [[(low[0], y), (high[0], y)] for y in ys]
     flat = np.array(lines)
     return np.concatenate([flat, np.full((*flat.shape[:2], 1), scene.plane_height)], axis=2), step
-
-
-def sharp_edges(vertices: Floats, triangles: NDArray[np.int64]) -> Floats:
-    """``(e, 2, 3)`` the edges between triangles that are not coplanar."""
-    scale = np.ptp(vertices, axis=0).max() or 1.0
-    _, merged = np.unique(np.round(vertices / scale, 7), axis=0, return_inverse=True)
-    corners = vertices[triangles]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
-
-    sides = np.sort(merged.reshape(-1)[triangles][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2))
-    ends = vertices[triangles[:, [[0, 1], [1, 2], [2, 0]]]].reshape(-1, 2, 3)
-    owner = np.repeat(np.arange(len(triangles)), 3)
-    _, first, edge = np.unique(sides, axis=0, return_index=True, return_inverse=True)
-    # Unit normals of an edge's n triangles add up to length n only where all of them agree.
-    total = np.zeros((len(first), 3))
-    np.add.at(total, edge.reshape(-1), normals[owner])
-    number = np.bincount(edge.reshape(-1))
-    return ends[first[(np.linalg.norm(total, axis=1) < 0.9995 * number) | (number == 1)]]
 
 
 def _axes(azimuth: float, elevation: float) -> Floats:

@@ -75,7 +75,7 @@ def test_the_film_is_a_file_that_plays_as_the_script_says(record, tmp_path, monk
     told = []
     film = film_episode(record, tmp_path / "a.mp4", SIZE, lambda *each: told.append(each))
     assert [path.name for path in tmp_path.iterdir()] == ["a.mp4"]
-    assert film.renderer == "matplotlib"
+    assert film.renderer == "NumPy"
     frames = frames_of(tmp_path / "a.mp4")
     shots = list(FilmScript(record, SIZE, 10).shots())
     assert told == [(drawn, len(shots)) for drawn in range(1, len(shots) + 1)]

@@ -11,6 +11,7 @@ from PIL import Image
 
 from palpate.envs.pictures import renderer
 from palpate.envs.pictures import view as picture_view
+from palpate.envs.pictures.marks import sharp_edges
 from palpate.envs.pictures.picture import draw, renderer_note
 from palpate.envs.pictures.picture_scene import Ghost, PictureScene, Tip
 from palpate.envs.pictures.renderer import Renderer
@@ -46,7 +47,7 @@ def l_scene() -> PictureScene:
     return PictureScene(
         object_vertices_world=vertices,
         object_triangles=triangles,
-        object_edges_world=picture_view.sharp_edges(vertices, triangles),
+        object_edges_world=sharp_edges(vertices, triangles),
         rays_world=np.array([*rays, ((0.08, 0.05, 0.5), (0.08, 0.05, 0.0))]),
         ray_hits=np.array([True, True, False]),
         contacts_world=contacts,
@@ -79,11 +80,11 @@ def no_gl(monkeypatch):
 
 
 @pytest.mark.usefixtures("no_gl")
-def test_without_gl_matplotlib_draws_and_says_so(scene, tmp_path):
+def test_without_gl_numpy_draws_and_says_so(scene, tmp_path):
     path = tmp_path / "out.png"
     painter = draw(scene, path, SIZE)
-    assert painter == "matplotlib"
-    assert "matplotlib" in renderer_note(painter)
+    assert painter == "NumPy"
+    assert "NumPy" in renderer_note(painter)
     assert [p.name for p in tmp_path.iterdir()] == ["out.png"]
     image = pixels(path)
     assert image.shape == (SIZE[1], SIZE[0], 3)
@@ -102,7 +103,7 @@ def test_with_gl_both_renderers_draw_the_same_scene(scene, tmp_path, monkeypatch
     assert all(contact_is_painted(by_gl, scene, contact) for contact in scene.contacts_world)
 
     monkeypatch.setenv("MUJOCO_GL", "nonsense")
-    assert draw(scene, tmp_path / "plot.png", SIZE) == "matplotlib"
+    assert draw(scene, tmp_path / "plot.png", SIZE) == "NumPy"
     by_plot = pixels(tmp_path / "plot.png")
     assert np.abs(by_gl - by_plot).mean() < 0.06
     assert np.abs(by_gl - by_plot[:, ::-1]).mean() > 0.06, "a mirror image should have failed"
@@ -110,7 +111,7 @@ def test_with_gl_both_renderers_draw_the_same_scene(scene, tmp_path, monkeypatch
 
 def test_a_renderer_that_hangs_is_given_up(scene, tmp_path, monkeypatch):
     monkeypatch.setattr(renderer, "GL_SECONDS", 0.01)
-    assert draw(scene, tmp_path / "out.png", SIZE) == "matplotlib"
+    assert draw(scene, tmp_path / "out.png", SIZE) == "NumPy"
 
 
 @pytest.mark.usefixtures("no_gl")
@@ -167,11 +168,11 @@ def painted(painter, scene, stage):
     return painter.draw(scene, stage, SIZE).astype(float) / 255
 
 
-@pytest.fixture(scope="module", params=["MuJoCo", "matplotlib"])
+@pytest.fixture(scope="module", params=["MuJoCo", "NumPy"])
 def painter(request):
     """A renderer of either kind."""
     with pytest.MonkeyPatch.context() as patch:
-        if request.param == "matplotlib":
+        if request.param == "NumPy":
             patch.setenv("MUJOCO_GL", "nonsense")
         made = Renderer()
         made.draw(l_scene(), Stage.of(l_scene(), SIZE), SIZE)
@@ -257,7 +258,7 @@ def test_a_process_that_dies_on_the_way_is_made_up_for(scene):
         assert painter._process is not None
         painter._process.end()
         assert painter.draw(scene, stage, SIZE).shape == (SIZE[1], SIZE[0], 3)
-        assert painter.name == "matplotlib"
+        assert painter.name == "NumPy"
 
 
 @pytest.mark.parametrize("shared", [True, False], ids=["shared vertices", "loose triangles"])
@@ -265,7 +266,7 @@ def test_the_edges_of_an_l_prism_are_its_eighteen(shared):
     vertices, triangles = l_prism()
     if not shared:
         vertices, triangles = vertices[triangles].reshape(-1, 3), np.arange(60).reshape(20, 3)
-    edges = picture_view.sharp_edges(vertices, triangles)
+    edges = sharp_edges(vertices, triangles)
     assert len(edges) == 18
     lengths = np.linalg.norm(edges[:, 1] - edges[:, 0], axis=1)
     assert lengths.sum() == pytest.approx(2 * 0.22 + 6 * 0.02)

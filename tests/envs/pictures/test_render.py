@@ -94,7 +94,7 @@ def test_rendering_needs_no_gl(env, monkeypatch):
     env.step(ACTION)
     picture = env.render()
     assert picture.shape == (150, 200, 3)
-    assert env._view._renderer.name == "matplotlib"
+    assert env._view._renderer.name == "NumPy"
     assert near(picture, picture_view.CONTACT, 0.25).any()
 
 
@@ -105,7 +105,7 @@ def test_rendering_survives_a_gl_library_that_kills(env, monkeypatch):
     env._view.close()
     env.reset(seed=0)
     assert env.render().shape == (150, 200, 3)
-    assert env._view._renderer.name == "matplotlib"
+    assert env._view._renderer.name == "NumPy"
 
 
 def test_the_leading_rivals_are_ghosts_of_several_objects_but_never_the_truth(env):
