@@ -2,29 +2,16 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterator, Sequence
-from dataclasses import asdict
+from collections.abc import Sequence
 from pathlib import Path
-from time import perf_counter
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
-if TYPE_CHECKING:
-    from rich.console import Console
-
-    from ..benchmark.config import BenchmarkConfig
-    from ..benchmark.store import RowStore
-    from ..benchmark.workers import Play
-
-__all__ = ["benchmark", "run_benchmark"]
+__all__ = ["benchmark"]
 
 MEMO_NOISE = ("pi/10,0.01in", "pi/10,0.05in", "pi/8,0.05in")
 """Rows of the memo's tables; the last is its worst."""
-REDRAWN_EVERY = 0.5
-"""Seconds between two drawings of the progress bar, so that no decision is timed during one."""
-SETTINGS_FILE = "config.json"
 
 
 def benchmark(
@@ -113,6 +100,7 @@ def benchmark(
     from ...assets import STAND_IN_NAMES
     from ...policies import POLICY_NAMES
     from ..benchmark.config import ALL_OBJECTS, BenchmarkConfig
+    from ..benchmark.run import check, run_benchmark
     from ..benchmark.workers import look_in, player
 
     here = str(Path.cwd())
@@ -132,137 +120,6 @@ def benchmark(
     console = Console(highlight=False, soft_wrap=True)
     run_benchmark(config, out, player(here), workers=workers, backend=backend, console=console)
     console.print(f"{len(config)} episodes are in {out}; next: palpate report {out}")
-
-
-def check(config: BenchmarkConfig) -> None:
-    """Refuse what would only fail once it is played.
-
-    Raises:
-        ValueError: objects, bounds, a sensor, a placement or a strategy that won't do.
-    """
-    from ...policies import make_policy
-    from ..benchmark.playing import task_of
-    from ..benchmark.workers import environment
-
-    settings = config.settings
-    for setting in settings:
-        if setting.noise == settings[0].noise or setting.objects == settings[0].objects:
-            environment(setting)
-    task = task_of(environment(settings[0]), settings[0].goal)
-    for name in config.policies:
-        make_policy(name, task)
-
-
-def run_benchmark(
-    config: BenchmarkConfig,
-    folder: Path,
-    play: Play,
-    *,
-    workers: int = 1,
-    backend: str = "joblib",
-    console: Console | None = None,
-) -> None:
-    """Play what a folder lacks of a benchmark's episodes.
-
-    Args:
-        config: the benchmark.
-        folder: where its rows are, or will be.
-        play: what plays an episode.
-        workers: how many at a time.
-        backend: see `benchmark_workers`.
-        console: where to draw a progress bar; none, and nothing is drawn.
-
-    Raises:
-        ValueError: the folder holds another benchmark, or another process writes to it; a package
-            is missing.
-    """
-    from ..benchmark.store import RowStore, only_writer
-    from ..benchmark.workers import play_all
-
-    store = RowStore(folder)
-    with only_writer(folder):
-        _settle(config, folder)
-        store.clear_leftovers()
-        done = {row.number for row in store.rows()}
-        missing = [job for job in config.jobs() if job.number not in done]
-        rows = play_all(play, missing, workers=workers, backend=backend)
-        for row in _under_a_bar(rows, store, len(done), len(config), console):
-            store.add(row)
-        store.gather()
-
-
-def _under_a_bar(
-    rows: Iterator, store: RowStore, done: int, total: int, console: Console | None
-) -> Iterator:
-    """Pass rows on; each counts once it has been kept."""
-    from rich.console import Console
-    from rich.progress import Progress
-
-    from ..progress_bar import columns
-
-    console = console or Console(quiet=True)
-    with Progress(
-        *columns(), console=console, auto_refresh=False, disable=not console.is_terminal
-    ) as bar:
-        task = bar.add_task("episodes", total=total, completed=done)
-        bar.refresh()
-        drawn = perf_counter()
-        for row in rows:
-            yield row
-            bar.advance(task)
-            if perf_counter() - drawn > REDRAWN_EVERY:
-                bar.refresh()
-                drawn = perf_counter()
-        bar.refresh()
-
-
-def _settle(config: BenchmarkConfig, folder: Path) -> None:
-    """Write down what the folder holds; if it already says, hold it to that.
-
-    Raises:
-        ValueError: it is another benchmark's.
-    """
-    from ..benchmark.config import versions
-    from ..whole_file import write_whole
-
-    path = folder / SETTINGS_FILE
-    wanted = json.loads(json.dumps(asdict(config) | {"versions": json.loads(versions())}))
-    if not path.exists():
-        text = json.dumps(wanted | {"command": config.command(folder)}, indent=1)
-        write_whole(path, (text + "\n").encode())
-        return
-    begun = read_settings(folder)
-    for name, value in wanted.items():
-        if begun.get(name) != value:
-            raise ValueError(
-                f"{folder} holds a benchmark whose {name} {_verb(name)} {_said(begun.get(name))},"
-                f" not {_said(value)}: go on with that, or give another --out"
-            )
-
-
-def read_settings(folder: Path) -> dict[str, object]:
-    """What a benchmark's folder says it holds.
-
-    Raises:
-        ValueError: it isn't one.
-    """
-    path = folder / SETTINGS_FILE
-    if not path.is_file():
-        raise ValueError(f"{folder}: not the folder of a benchmark, it has no {SETTINGS_FILE}")
-    try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except ValueError as wrong:
-        raise ValueError(f"{path}: not JSON ({wrong})") from wrong
-
-
-def _said(value: object) -> str:
-    if isinstance(value, dict):
-        return ", ".join(f"{key} {each}" for key, each in value.items())
-    return " ".join(map(str, value)) if isinstance(value, list) else str(value)
-
-
-def _verb(name: str) -> str:
-    return "are" if name.endswith("s") else "is"
 
 
 def _listed(given: Sequence[str] | None) -> tuple[str, ...]:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-from importlib import import_module
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -13,37 +11,11 @@ import typer
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from ..memo.section import Plan, Section
+    from ..memo.section import Experiment, Plan, Section
 
 __all__ = ["reproduce"]
 
 
-@dataclass(frozen=True)
-class Group:
-    """Experiments that one module runs, from the same trials if there are several."""
-
-    module: str
-    names: tuple[str, ...]
-
-    def run(self, plan: Plan, wanted: Sequence[str]) -> tuple[Section, ...]:
-        """The sections of those of its experiments that are wanted."""
-        module = import_module(f".{self.module}", __package__)
-        if len(self.names) == 1:
-            return (module.run(plan),)
-        return module.sections(plan, [name for name in self.names if name in wanted])
-
-
-GROUPS = (
-    Group("memo_planar", ("table1",)),
-    Group("memo_grid", ("table2", "table3", "table4", "table6", "figure8")),
-    Group("memo_errors", ("table5",)),
-    Group("memo_triads", ("table7", "table8", "table9")),
-    Group("memo_levels", ("table10", "table11")),
-    Group("memo_range", ("range",)),
-    Group("memo_bounds", ("bounds",)),
-    Group("memo_timing", ("timing",)),
-    Group("memo_constraints", ("constraints",)),
-)
 ORDER = (
     *(f"table{number}" for number in range(1, 7)),
     *("figure8", *(f"table{number}" for number in range(7, 12))),
@@ -103,21 +75,24 @@ def reproduce(
     triads of rays. table10, 11: the tree level by level. range, bounds, timing: Sections 5, 6, 7.
     constraints: what each is worth.
     """
+    wanted = _checked(experiments or [EVERYTHING])
+    if out is not None and out.exists() and not out.is_dir():
+        raise ValueError(f"{out} is a file: --out takes a folder")
+    from ..one_thread import keep_to_one_thread
+
+    keep_to_one_thread()
+    # Only now: what these import reads the number of threads once.
     from rich.console import Console
 
     from ..memo.page import verdict, write_page
     from ..memo.pool import open_plan, processors
 
-    wanted = _checked(experiments or [EVERYTHING])
-    if out is not None and out.exists() and not out.is_dir():
-        raise ValueError(f"{out} is a file: --out takes a folder")
     console = Console(highlight=False)
     sections: list[Section] = []
     with open_plan(trials, seed, workers or processors(), Console(stderr=True)) as plan:
-        for group in GROUPS:
-            if not set(wanted) & set(group.names):
-                continue
-            for section in group.run(plan, wanted):
+        for names, run in groups().items():
+            asked = [name for name in names if name in wanted]
+            for section in run(plan, asked) if asked else ():
                 show(section, console)
                 sections.append(section)
     sections.sort(key=lambda section: ORDER.index(section.name))
@@ -125,6 +100,29 @@ def reproduce(
     if out is not None:
         stem = write_page(sections, command(experiments, trials, seed), out, trials)
         console.print(f"{stem}.html, .md and .json", soft_wrap=True)
+
+
+def groups() -> dict[tuple[str, ...], Callable[[Plan, Sequence[str]], tuple[Section, ...]]]:
+    """What runs the experiments; those of one group share their trials, so they run together."""
+    from ..memo import constraints, grid, levels, planar, timing, triads
+    from ..memo.bounds import bounds
+    from ..memo.errors import errors
+    from ..memo.range import range
+
+    def alone(run: Experiment) -> Callable[[Plan, Sequence[str]], tuple[Section, ...]]:
+        return lambda plan, _: (run(plan),)
+
+    return {
+        ("table1",): alone(planar.run),
+        grid.NAMES: grid.sections,
+        ("table5",): alone(errors.run),
+        triads.NAMES: triads.sections,
+        levels.NAMES: levels.sections,
+        ("range",): alone(range.run),
+        ("bounds",): alone(bounds.run),
+        ("timing",): alone(timing.run),
+        ("constraints",): alone(constraints.run),
+    }
 
 
 def show(section: Section, console: Console) -> None:

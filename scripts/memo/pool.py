@@ -9,10 +9,11 @@ from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing import get_context
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
-if TYPE_CHECKING:
-    from rich.console import Console
+from rich.console import Console
+
+from ..progress_bar import under_a_bar
 
 Case = TypeVar("Case")
 Result = TypeVar("Result")
@@ -20,7 +21,7 @@ Result = TypeVar("Result")
 
 @dataclass(eq=False)
 class PoolPlan:
-    """A `memo_section.Plan`: what was asked for, and who runs it."""
+    """A `section.Plan`: what was asked for, and who runs it."""
 
     trials: int | None
     seed: int
@@ -32,12 +33,12 @@ class PoolPlan:
     def map(
         self, function: Callable[[Case], Result], cases: Sequence[Case], label: str
     ) -> Iterable[Result]:
-        """Results in the order of the cases; see `memo_section.Plan`."""
+        """Results in the order of the cases; see `section.Plan`."""
         if self.pool is None:
             results: Iterable[Result] = map(function, cases)
         else:
             results = self.pool.map(function, cases)
-        return _under_a_bar(results, len(cases), label, self.console)
+        return under_a_bar(results, len(cases), label, self.console)
 
 
 @contextmanager
@@ -50,9 +51,6 @@ def open_plan(trials: int | None, seed: int, workers: int, console: Console) -> 
         workers: processes; with one, no other than this.
         console: where progress is shown, if it is a terminal.
     """
-    from ..one_thread import keep_to_one_thread
-
-    keep_to_one_thread()
     if workers == 1:
         yield PoolPlan(trials, seed, console, None)
         return
@@ -74,18 +72,3 @@ def processors() -> int:
 def _leave_interrupts() -> None:
     """Let the process that was started by hand answer Ctrl-C, for all."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-
-
-def _under_a_bar(
-    results: Iterable[Result], total: int, label: str, console: Console
-) -> Iterator[Result]:
-    from rich.progress import Progress
-
-    from ..progress_bar import columns
-
-    shown = console.is_terminal
-    with Progress(*columns(), console=console, transient=True, disable=not shown) as bar:
-        task = bar.add_task(label, total=total)
-        for result in results:
-            bar.advance(task)
-            yield result
