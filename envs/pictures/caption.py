@@ -21,7 +21,7 @@ from .view import CONTACT, GRID, OBJECT, RAY_HIT, RAY_MISSED, Colour, Stage, gho
 if TYPE_CHECKING:
     from ...recognizer import Belief
 
-__all__ = ["Caption", "add_caption", "belief_text", "caption_of", "length_text"]
+__all__ = ["Caption", "add_caption", "belief_text", "caption_of", "length_text", "letters"]
 
 Entry = tuple[Colour, str]
 
@@ -58,7 +58,7 @@ def add_caption(picture: NDArray[np.uint8], caption: Caption) -> Image:
     unit = caption.scale * image.height / 960  # sizes below are for 960 pixels of height
     margin = 36 * unit
     room = image.width - 2 * margin
-    font = _font(17 * unit)
+    font = letters(17 * unit)
     rows = [row for entries in caption.legend for row in _rows(entries, font, room, unit)]
 
     image = _with_bands(image, 106 * unit, (24 + 30 * len(rows)) * unit)
@@ -148,13 +148,14 @@ def length_text(metres: float) -> str:
 
 def _fitting(text: str, size: float, room: float, bold: bool = False) -> ImageFont.FreeTypeFont:
     """The font, made smaller where the text would not fit."""
-    font = _font(size, bold)
+    font = letters(size, bold)
     length = font.getlength(text)
-    return font if length <= room else _font(size * room / length, bold)
+    return font if length <= room else letters(size * room / length, bold)
 
 
 @cache
-def _font(size: float, bold: bool = False) -> ImageFont.FreeTypeFont:
+def letters(size: float, bold: bool = False) -> ImageFont.FreeTypeFont:
+    """The font of everything that is written, ``size`` pixels high."""
     name = "DejaVuSans-Bold.ttf" if bold else "DejaVuSans.ttf"
     path = Path(matplotlib.get_data_path(), "fonts", "ttf", name)
     return ImageFont.truetype(str(path), max(size, 5))

@@ -331,13 +331,3 @@ def test_listing_the_library_imports_neither_numpy_nor_manifold3d() -> None:
         "sys.exit(not {'numpy', 'manifold3d'}.isdisjoint(sys.modules))"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
-
-
-def test_the_contact_sheet_is_drawn_alike_twice(tmp_path: Path) -> None:
-    pytest.importorskip("matplotlib")
-    from palpate.assets.contact_sheet import draw
-
-    draw(tmp_path / "one.png", pixels_per_inch=12)
-    draw(tmp_path / "two.png", pixels_per_inch=12)
-    assert (tmp_path / "one.png").read_bytes() == (tmp_path / "two.png").read_bytes()
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["one.png", "two.png"]
