@@ -1,8 +1,16 @@
 """The simulated finger: MuJoCo scene, sensors, pictures, Gymnasium environments.
 
-Importing this package registers `palpate/Probe-v0`, `palpate/ProbeRest-v0`,
-`palpate/ProbeFinger-v0` and `palpate/ProbePlanar-v0`.
+Importing this package registers, with these arguments of the class unless others are given:
+
+| id | class | arguments |
+|---|---|---|
+| palpate/Probe-v0 | `probe_env.ProbeEnv` | none: an object held anyhow, touched by rays |
+| palpate/ProbeRest-v0 | the same | placement="resting": it stands on a plane that is known |
+| palpate/ProbeFinger-v0 | the same | sensor="finger": a ball tip that force-limited motors drive |
+| palpate/ProbePlanar-v0 | `planar.planar_env.PlanarProbeEnv` | none: outlines, touched by rays |
 """
+
+from typing import Any
 
 import gymnasium
 
@@ -13,11 +21,13 @@ REST_ENV_ID = "palpate/ProbeRest-v0"
 FINGER_ENV_ID = "palpate/ProbeFinger-v0"
 PLANAR_ENV_ID = "palpate/ProbePlanar-v0"
 
-for _name, _entry_point in (
-    (ENV_ID, "probe_env:ProbeEnv"),
-    (REST_ENV_ID, "ready_envs:ProbeRestEnv"),
-    (FINGER_ENV_ID, "ready_envs:ProbeFingerEnv"),
-    (PLANAR_ENV_ID, "planar_env:PlanarProbeEnv"),
-):
+_READY: dict[str, tuple[str, dict[str, Any]]] = {
+    ENV_ID: ("probe_env:ProbeEnv", {}),
+    REST_ENV_ID: ("probe_env:ProbeEnv", {"placement": "resting"}),
+    FINGER_ENV_ID: ("probe_env:ProbeEnv", {"sensor": "finger"}),
+    PLANAR_ENV_ID: ("planar.planar_env:PlanarProbeEnv", {}),
+}
+
+for _name, (_entry_point, _arguments) in _READY.items():
     if _name not in gymnasium.registry:
-        gymnasium.register(_name, entry_point=f"palpate.envs.{_entry_point}")
+        gymnasium.register(_name, f"palpate.envs.{_entry_point}", kwargs=_arguments)
