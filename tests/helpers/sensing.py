@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from oracles import solids as oracles
+from oracles.solids import random_pose
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from palpate.envs.sensors.noise import uniform_in_ball, uniform_in_cone
@@ -34,6 +35,13 @@ HOLED = Polyhedron.from_mesh(
 )
 SMALL = {model.name: model for model in (CUBE, L_BLOCK, HOLED)}
 """Solids of a few faces: all of them alike, two of them concave, two of them with a hole."""
+INSIDE = 1.0 - 1e-9
+"""As far out as a bound goes, to rounding."""
+
+
+def solid(name: str) -> Polyhedron:
+    """One of `SMALL`, a stand-in, or one of the oracles' solids."""
+    return SMALL[name] if name in SMALL else oracles.model(name)
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,10 +61,6 @@ class Touches:
 
     def __getitem__(self, rows: NDArray[np.integer]) -> Touches:
         return Touches(self.T_world_object, self.points[rows], self.normals[rows], self.faces[rows])
-
-
-def random_pose(rng: np.random.Generator) -> RigidTransform:
-    return RigidTransform.from_components(rng.uniform(-0.5, 0.5, 3), Rotation.random(rng=rng))
 
 
 def sense_grid(
@@ -146,6 +150,28 @@ def _within(corners: Floats, rng: np.random.Generator) -> Floats:
     return rng.dirichlet(np.ones(len(corners))) @ corners
 
 
+def shifts_within(
+    rng: np.random.Generator, count: int, bound: float, at_bounds: bool = False
+) -> Floats:
+    """(count, 3) shifts, uniform in a ball, or as far out as they may be."""
+    shifts = uniform_in_ball(rng, count, bound)
+    if at_bounds:
+        shifts *= INSIDE * bound / np.linalg.norm(shifts, axis=1, keepdims=True)
+    return shifts
+
+
+def leaning(
+    rng: np.random.Generator, directions: Floats, bound: float, at_bounds: bool = False
+) -> Floats:
+    """Unit vectors (n, 3) turned uniformly in a cone, or as far as they may be."""
+    turned = uniform_in_cone(rng, directions, bound)
+    if at_bounds:
+        aside = turned - (turned * directions).sum(axis=1, keepdims=True) * directions
+        aside /= np.linalg.norm(aside, axis=1, keepdims=True)
+        turned = np.cos(INSIDE * bound) * directions + np.sin(INSIDE * bound) * aside
+    return turned
+
+
 def feel(
     touches: Touches,
     rng: np.random.Generator,
@@ -159,19 +185,11 @@ def feel(
 
     With ``alike`` all normals are turned alike: as the object itself might be, for all they say.
     """
-    count = len(touches)
-    shifts = uniform_in_ball(rng, count, position_error)
-    normals = uniform_in_cone(rng, touches.normals, normal_error)
-    if at_bounds:
-        shifts *= position_error * (1.0 - 1e-12) / np.linalg.norm(shifts, axis=1, keepdims=True)
-        along = (normals * touches.normals).sum(axis=1, keepdims=True)
-        tangents = normals - along * touches.normals
-        tangents /= np.linalg.norm(tangents, axis=1, keepdims=True)
-        edge = normal_error - 1e-9
-        normals = np.cos(edge) * touches.normals + np.sin(edge) * tangents
+    shifts = shifts_within(rng, len(touches), position_error, at_bounds)
+    normals = leaning(rng, touches.normals, normal_error, at_bounds)
     if alike:
         axis = rng.normal(size=3)
-        turn = (normal_error - 1e-9) * axis / np.linalg.norm(axis)
+        turn = INSIDE * normal_error * axis / np.linalg.norm(axis)
         normals = Rotation.from_rotvec(turn).apply(touches.normals)
     return Contacts(
         touches.points + shifts,

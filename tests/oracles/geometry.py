@@ -77,21 +77,28 @@ def triangle_distances(points: Floats, triangles: Floats) -> Floats:
     return np.where(above, heights, to_edges)
 
 
+def windings(triangles: Floats, points: Floats) -> Floats:
+    """(p,) how often a closed surface (t, 3, 3) is wound about points (p, 3): 1 inside, 0 outside.
+
+    The solid angle of it that each sees, over 4 pi (Van Oosterom and Strackee 1983).
+    """
+    a, b, c = np.moveaxis(triangles - points[:, None, None], 2, 0)
+    la, lb, lc = (np.linalg.norm(side, axis=-1) for side in (a, b, c))
+    volumes = (a * np.cross(b, c)).sum(-1)
+    beside = la * lb * lc + (a * b).sum(-1) * lc + (b * c).sum(-1) * la + (c * a).sum(-1) * lb
+    return np.arctan2(volumes, beside).sum(axis=1) / (2.0 * np.pi)
+
+
 def signed_distances(model: Polyhedron, points: Floats) -> Floats:
     """(p,) distances of points (p, 3) from a solid's surface, object frame, negative inside it."""
     triangles = model.vertices[model.triangles]
     found = np.empty(len(points))
     step = max(1, CHUNK // len(triangles))
     for first in range(0, len(points), step):
-        some = points[first : first + step, None]
-        distances = triangle_distances(some, triangles).min(axis=1)
-        a, b, c = (triangles[:, k] - some for k in range(3))
-        la, lb, lc = (np.linalg.norm(side, axis=-1) for side in (a, b, c))
-        volumes = (a * np.cross(b, c)).sum(-1)
-        beside = la * lb * lc + (a * b).sum(-1) * lc + (b * c).sum(-1) * la + (c * a).sum(-1) * lb
-        # Half the solid angle that the surface fills: two pi from inside, none from outside.
-        seen = np.arctan2(volumes, beside).sum(axis=1)
-        found[first : first + step] = np.where(seen > np.pi, -distances, distances)
+        some = points[first : first + step]
+        distances = triangle_distances(some[:, None], triangles).min(axis=1)
+        inside = windings(triangles, some) > 0.5
+        found[first : first + step] = np.where(inside, -distances, distances)
     return found
 
 

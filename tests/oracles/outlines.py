@@ -7,9 +7,9 @@ linear programs and minimiser.
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -47,13 +47,20 @@ OUTLINES: dict[str, ArrayLike] = {
     "70-gon": regular(70),
 }
 SMALL = ("triangle", "square", "l-shape")
+SHAPES = (*PLANAR_NAMES, "square", "l-shape", "hexagon", "comb")
+"""What is tried on outlines of all kinds: the stand-ins, symmetric ones and concave ones."""
+
+
+@cache
+def outline(name: str) -> Polygon:
+    """A stand-in or one of `OUTLINES`."""
+    corners = planar_corners(name) if name in PLANAR_NAMES else OUTLINES[name]
+    return Polygon.from_corners(corners, name=name)
 
 
 @cache
 def entry(name: str) -> PlanarEntry:
-    """A stand-in or one of `OUTLINES`."""
-    corners = planar_corners(name) if name in PLANAR_NAMES else OUTLINES[name]
-    return PlanarEntry.of(Polygon.from_corners(corners, name=name))
+    return PlanarEntry.of(outline(name))
 
 
 # --- Samplers -------------------------------------------------------------------------------
@@ -126,6 +133,37 @@ def feel(
         normal_error=alpha,
     )
     return Felt(contacts, edges.astype(np.int32), angle, shift)
+
+
+def felt_outline(
+    name: str, count: int, seed: int, *, dist: float = 0.01, normal: float = 0.3, **sampler: Any
+) -> Felt:
+    """Contacts with a shape at a random pose; the bound on position as a share of its size."""
+    model, rng = outline(name), np.random.default_rng(seed)
+    delta = dist * model.diameter
+    return feel(model, count, rng, position_error=delta, normal_error=normal, **sampler)
+
+
+def unrelated_in_plane(name: str, count: int, seed: int) -> Contacts:
+    """Contacts with nothing in particular, some of them degenerate, some without normals."""
+    rng, size = np.random.default_rng(seed), outline(name).diameter
+    positions = rng.uniform(-0.5, 0.5, (count, 2)) * size
+    normals = turned(np.tile([1.0, 0.0], (count, 1)), rng.uniform(-np.pi, np.pi, count))
+    for row in range(1, count):
+        kind = rng.integers(6)
+        if kind == 0:
+            positions[row] = positions[row - 1]
+        elif kind == 1:  # straight along a normal
+            positions[row] = positions[row - 1] + 0.3 * size * normals[row - 1]
+        elif kind == 2:
+            normals[row] = rng.choice([-1.0, 1.0]) * normals[row - 1]
+    normals[rng.random(count) < 0.2] = np.nan
+    return Contacts(
+        positions,
+        normals,
+        position_error=size * 10.0 ** rng.uniform(-5, -0.5, count),
+        normal_error=rng.choice([1e-3, 0.1, 0.4, 2.0, np.pi], count),
+    )
 
 
 def moved(contacts: Contacts, angle: float, shift: ArrayLike) -> Contacts:
@@ -210,18 +248,6 @@ def pair_margins(
             off = np.abs(wrapped(omega - (low + high) / 2))
             margins += [(high - low) / 2 + alpha + swing - off]
     return np.min(margins, axis=0)
-
-
-def enumerate_interpretations(
-    tables: PlanarTables, contacts: Contacts, constraints: tuple[str, ...]
-) -> NDArray[np.int64]:
-    """All assignments of edges to contacts, every one tried."""
-    count = len(contacts)
-    grid = np.indices((tables.face_count,) * count).reshape(count, -1).T
-    fits = np.ones(len(grid), bool)
-    for i, j in itertools.combinations(range(count), 2):
-        fits &= pair_margins(tables, contacts, i, j, constraints)[grid[:, i], grid[:, j]] >= 0.0
-    return grid[fits]
 
 
 # --- Verdicts -------------------------------------------------------------------------------

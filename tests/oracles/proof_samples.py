@@ -7,9 +7,10 @@ from functools import cache, cached_property
 from typing import Any
 
 import numpy as np
-from helpers.sensing import INCH, SMALL, Touches, feel, forget_normals, random_pose, touch_features
+from helpers.sensing import INCH, SMALL, Touches, feel, forget_normals, touch_features
 from numpy.typing import NDArray
 from oracles.checker import check
+from oracles.solids import random_pose
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from palpate.envs.library import load_library
@@ -84,7 +85,7 @@ TESTS = [
 
 
 @cache
-def touched(which: int) -> Touches:
+def places_on(which: int) -> Touches:
     """Places on all features of a tested model, to draw from: much faster than new ones."""
     model, test = TESTS[which]
     return touch_features(model, test.features, np.random.default_rng([25, which]), 250)
@@ -94,7 +95,7 @@ def draw(rng: np.random.Generator, fewest: int = 1, most: int = 20) -> Sample:
     """Few and many contacts, precise and vague, a few of them of unknown normal or on nothing."""
     which = int(rng.integers(len(TESTS)))
     model, test = TESTS[which]
-    known = touched(which)
+    known = places_on(which)
     rows = rng.integers(len(known), size=rng.integers(fewest, most + 1))
     pose, back = random_pose(rng), known.T_world_object.inv()
     touches = Touches(
@@ -118,7 +119,7 @@ def direction(rng: np.random.Generator) -> Floats:
     return axis / np.linalg.norm(axis)
 
 
-def turned(rotation: Rotation, angle: float, rng: np.random.Generator) -> Rotation:
+def rotation_near(rotation: Rotation, angle: float, rng: np.random.Generator) -> Rotation:
     """A rotation an angle away, or less far half of the time."""
     share = 1.0 - 1e-9 if rng.random() < 0.5 else rng.random()
     return rotation * Rotation.from_rotvec(angle * share * direction(rng))
@@ -128,8 +129,8 @@ def start_near(
     sample: Sample, rng: np.random.Generator, angle: float, off: float = 0.0
 ) -> tuple[Floats, Floats, Floats]:
     """A ball that holds the truth and a pose about which to ask: ball, rotation, translation."""
-    ball = sample.true_rotation @ turned(Rotation.identity(), angle, rng).as_matrix()
-    rotation = ball @ turned(Rotation.identity(), off, rng).as_matrix()
+    ball = sample.true_rotation @ rotation_near(Rotation.identity(), angle, rng).as_matrix()
+    rotation = ball @ rotation_near(Rotation.identity(), off, rng).as_matrix()
     away = rng.normal(size=3) * rng.choice([0.0, 0.01, 0.05])
     return ball, rotation, sample.true_translation + away
 

@@ -8,7 +8,9 @@ from one line of linear algebra a triangle.
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable
 from functools import cache
+from typing import Any
 
 import numpy as np
 import trimesh
@@ -21,6 +23,7 @@ from palpate.envs.sensors.noise import uniform_in_ball, uniform_in_cone
 from palpate.recognizer import Contacts, PairTables, Polyhedron
 
 Floats = NDArray[np.float64]
+Margins = Callable[[Any, Contacts, int, int, tuple[str, ...]], Floats]
 
 # --- Solids ---------------------------------------------------------------------------------
 
@@ -128,6 +131,17 @@ def tables(name: str) -> PairTables:
     return PairTables.of(model(name))
 
 
+def mesh_of(model: Polyhedron, scale: float = 1.0) -> trimesh.Trimesh:
+    """A model's surface, in other units perhaps."""
+    return trimesh.Trimesh(scale * model.vertices, model.triangles, process=False)
+
+
+def scaled(name: str, diameter: float) -> Polyhedron:
+    """A stand-in or one of `SOLIDS`, made as large as is asked for."""
+    mesh = mesh_of(model(name), diameter / model(name).diameter)
+    return Polyhedron.from_mesh(mesh, name=f"scaled {name}")
+
+
 # --- Samplers -------------------------------------------------------------------------------
 
 
@@ -139,7 +153,8 @@ def points_on(
     return np.einsum("nk,nkd->nd", weights, model.vertices[model.triangles[triangles]])
 
 
-def random_pose(rng: np.random.Generator, extent: float) -> RigidTransform:
+def random_pose(rng: np.random.Generator, extent: float = 0.5) -> RigidTransform:
+    """Any rotation, and a shift of up to an extent along each axis, metres."""
     return RigidTransform.from_components(rng.uniform(-extent, extent, 3), Rotation.random(rng=rng))
 
 
@@ -316,21 +331,34 @@ def pair_margins(
 
 
 def pair_is_allowed(
-    tables: PairTables, contacts: Contacts, constraints: tuple[str, ...]
+    tables: Any,
+    contacts: Contacts,
+    constraints: tuple[str, ...],
+    margins: Margins = pair_margins,
 ) -> dict[tuple[int, int], NDArray[np.bool_]]:
     """For all i < j, which faces (of i, of j) fit contacts i and j."""
     pairs = itertools.combinations(range(len(contacts)), 2)
-    return {(i, j): pair_margins(tables, contacts, i, j, constraints) >= 0.0 for i, j in pairs}
+    return {(i, j): margins(tables, contacts, i, j, constraints) >= 0.0 for i, j in pairs}
 
 
 def enumerate_interpretations(
-    tables: PairTables, contacts: Contacts, constraints: tuple[str, ...]
+    tables: Any,
+    contacts: Contacts,
+    constraints: tuple[str, ...],
+    margins: Margins = pair_margins,
 ) -> NDArray[np.int64]:
-    """All assignments of faces to contacts, every one tried."""
+    """All assignments of faces to contacts, every one tried.
+
+    Args:
+        tables: of a solid; of an outline too, whose edges are its faces.
+        contacts: what was felt.
+        constraints: their names.
+        margins: by how much pairs of faces fit; of an outline, that of `oracles.outlines`.
+    """
     count = len(contacts)
     grid = np.indices((tables.face_count,) * count).reshape(count, -1).T
     fits = np.ones(len(grid), bool)
-    for (i, j), allowed in pair_is_allowed(tables, contacts, constraints).items():
+    for (i, j), allowed in pair_is_allowed(tables, contacts, constraints, margins).items():
         fits &= allowed[grid[:, i], grid[:, j]]
     return grid[fits]
 
