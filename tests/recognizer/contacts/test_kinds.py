@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
+from helpers.beliefs import interpretations_of
 from numpy.typing import NDArray
 
 from palpate.recognizer import (
@@ -29,7 +30,7 @@ WEDGE = Polyhedron.from_mesh(
 CUBE = Polyhedron.from_mesh(trimesh.creation.box((0.05, 0.05, 0.05)), name="cube")
 
 
-def felt(
+def felt_with_kinds(
     model: Polyhedron, count: int, sharp: int, rng: np.random.Generator
 ) -> tuple[Contacts, NDArray[np.int32]]:
     """Contacts of a solid, some on edges and vertices, with their kinds; and what each is on."""
@@ -56,11 +57,10 @@ def without_kinds(contacts: Contacts) -> Contacts:
     )
 
 
-def interpretations(recognizer: Recognizer, contacts: Contacts) -> set[tuple[int, ...]]:
+def found_by(recognizer: Recognizer, contacts: Contacts) -> set[tuple[int, ...]]:
     belief = recognizer.recognize(contacts)
     assert belief.complete
-    rows = [h.interpretations for h in belief.hypotheses]
-    return {tuple(map(int, row)) for group in rows for row in group}
+    return interpretations_of(belief)
 
 
 @pytest.mark.parametrize("model", [WEDGE, CUBE], ids=lambda model: model.name)
@@ -71,14 +71,14 @@ def test_kinds_leave_the_interpretations_that_agree_with_them(model: Polyhedron)
     rng = np.random.default_rng(3)
     fewer = 0
     for _ in range(12):
-        contacts, truth = felt(model, 4, int(rng.integers(3)), rng)
-        everything = interpretations(recognizer, without_kinds(contacts))
+        contacts, truth = felt_with_kinds(model, 4, int(rng.integers(3)), rng)
+        everything = found_by(recognizer, without_kinds(contacts))
         agreeing = {
             row
             for row in everything
             if np.array_equal(FACE + np.searchsorted(ends, row, side="right"), contacts.kinds)
         }
-        found = interpretations(recognizer, contacts)
+        found = found_by(recognizer, contacts)
         assert tuple(map(int, truth)) in found
         # The symmetric solid is searched from one feature of each orbit, and spread out again.
         assert found == agreeing
@@ -90,19 +90,18 @@ def test_the_truth_is_kept_whatever_was_touched() -> None:
     rng = np.random.default_rng(4)
     recognizer = Recognizer([WEDGE], features="all")
     for _ in range(150):
-        contacts, truth = felt(WEDGE, int(rng.integers(3, 9)), int(rng.integers(4)), rng)
-        assert tuple(map(int, truth)) in interpretations(recognizer, contacts)
+        contacts, truth = felt_with_kinds(WEDGE, int(rng.integers(3, 9)), int(rng.integers(4)), rng)
+        assert tuple(map(int, truth)) in found_by(recognizer, contacts)
 
 
 def test_further_contacts_of_known_kinds_extend_a_belief() -> None:
     rng = np.random.default_rng(5)
     recognizer = Recognizer([WEDGE], features="all")
     for _ in range(20):
-        contacts, _ = felt(WEDGE, 7, 2, rng)
+        contacts, _ = felt_with_kinds(WEDGE, 7, 2, rng)
         first = recognizer.recognize(contacts[slice(0, 4)])
         after = recognizer.update(first, contacts[slice(4, None)])
-        rows = {tuple(map(int, row)) for h in after.hypotheses for row in h.interpretations}
-        assert rows == interpretations(recognizer, contacts)
+        assert interpretations_of(after) == found_by(recognizer, contacts)
 
 
 def test_kinds_hold_for_an_object_that_stands_on_a_plane_too() -> None:

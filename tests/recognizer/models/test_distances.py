@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from helpers.sensing import CUBE, SMALL
+from helpers.sensing import CUBE, SMALL, solid
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -23,10 +23,6 @@ OTHERS = ("l-block", "pocketed", "bridge", "tetrahedron", "hull-90", "stapler", 
 every_solid = pytest.mark.parametrize("name", [*SMALL, *OTHERS])
 
 
-def solid(name: str) -> Polyhedron:
-    return SMALL[name] if name in SMALL else oracles.model(name)
-
-
 def kernel_distances(model: Polyhedron, points: Floats) -> tuple[Floats, Floats]:
     """Signed distances (n,) and nearest points (n, 3) of the surface, from the kernels."""
     packed = ModelTest(model).model
@@ -38,7 +34,7 @@ def kernel_distances(model: Polyhedron, points: Floats) -> tuple[Floats, Floats]
     return np.array(distances), nearest
 
 
-def places(model: Polyhedron, rng: np.random.Generator, count: int) -> Floats:
+def places_near(model: Polyhedron, rng: np.random.Generator, count: int) -> Floats:
     """Points in and around a solid, many of them close to its surface."""
     low, high = model.vertices.min(axis=0), model.vertices.max(axis=0)
     around = rng.uniform(low - 0.3 * (high - low), high + 0.3 * (high - low), (count, 3))
@@ -50,7 +46,7 @@ def places(model: Polyhedron, rng: np.random.Generator, count: int) -> Floats:
 @every_solid
 def test_distances_and_their_signs_are_those_of_triangles_and_solid_angles(name: str) -> None:
     model = solid(name)
-    points = places(model, np.random.default_rng(1), 300)
+    points = places_near(model, np.random.default_rng(1), 300)
     distances, nearest = kernel_distances(model, points)
     expected = signed_distances(model, points)
     assert (expected < 0.0).sum() > 30
@@ -85,7 +81,7 @@ def test_edges_and_vertices_among_the_features_change_no_distance() -> None:
     model = SMALL["L-block"]
     near, nearest = np.empty(3), np.empty(3)
     plain, rich = (ModelTest(model, of(model)).model for of in (face_features, all_features))
-    for point in places(model, np.random.default_rng(2), 100):
+    for point in places_near(model, np.random.default_rng(2), 100):
         one, other = (
             signed_distance(point, packed, model.face_count, nearest, near)
             for packed in (plain, rich)
@@ -123,9 +119,9 @@ def sampled(model: Polyhedron, one: Floats, other: Floats, count: int = 2001) ->
 def test_no_place_of_a_path_is_nearer_than_the_deepest_found_to_the_grain(name: str) -> None:
     model = solid(name)
     rng = np.random.default_rng(3)
-    size = model.diameter
+    size, found_near = model.diameter, 0
     for case in range(12):
-        one, other = places(model, rng, 2)[[0, 2]]
+        one, other = places_near(model, rng, 2)[[0, 2]]
         if case % 3:
             one = other + size * (one - other) / np.linalg.norm(one - other)
         clearance = size * rng.uniform(-0.05, 0.1)
@@ -135,6 +131,7 @@ def test_no_place_of_a_path_is_nearer_than_the_deepest_found_to_the_grain(name: 
         if np.isinf(found):
             assert least >= clearance
             continue
+        found_near += 1
         # What was found is there, on the path.
         along = (other - one) / np.linalg.norm(other - one)
         aside = place - one - ((place - one) @ along) * along
@@ -148,6 +145,7 @@ def test_no_place_of_a_path_is_nearer_than_the_deepest_found_to_the_grain(name: 
             assert least < clearance + 1e-9 * size
             step = max(np.linalg.norm(other - one) / 64.0, grain)
             assert found <= least + step
+    assert found_near > 3
 
 
 @settings(max_examples=60, deadline=None, derandomize=True)
@@ -155,7 +153,7 @@ def test_no_place_of_a_path_is_nearer_than_the_deepest_found_to_the_grain(name: 
 def test_a_path_that_keeps_its_clearance_and_the_grain_is_let_through(seed: int, name: str) -> None:
     model = SMALL[name]
     rng = np.random.default_rng(seed)
-    one, other = places(model, rng, 2)[[0, 3]]
+    one, other = places_near(model, rng, 2)[[0, 3]]
     least = float(sampled(model, one, other, 401).min())
     step = float(np.linalg.norm(other - one)) / 400.0
     grain = model.diameter * 1e-3

@@ -5,21 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from oracles.geometry import segment_distances
-from oracles.outlines import L_SHAPE, OUTLINES, regular, rotation
+from oracles.outlines import L_SHAPE, OUTLINES, outline, regular, rotation
 
 from palpate.assets.planar import PLANAR_NAMES, PLANAR_STAND_INS, planar_corners
 from palpate.recognizer.models.polygon import Polygon
 from palpate.recognizer.models.polyhedron import MOST_FACES
 
 INCH = 0.0254
-SHAPES = {**OUTLINES, **{name: planar_corners(name) for name in PLANAR_NAMES}}
+SHAPES = (*OUTLINES, *PLANAR_NAMES)
 
 every_shape = pytest.mark.parametrize("name", SHAPES)
 every_stand_in = pytest.mark.parametrize("name", PLANAR_NAMES)
-
-
-def outline(name: str) -> Polygon:
-    return Polygon.from_corners(SHAPES[name], name=name)
 
 
 def inside(points: np.ndarray, corners: np.ndarray) -> np.ndarray:

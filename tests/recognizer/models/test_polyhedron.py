@@ -306,6 +306,7 @@ def test_symmetries_are_the_groups_of_geometry_books(name, scale):
 def test_every_symmetry_maps_the_surface_onto_itself(name):
     solid, rng = Polyhedron.from_mesh(moved(GROUPS[name][0](), seed=2)), np.random.default_rng(6)
     points, _ = surface_points(solid, 60, rng, awkward=True)
+    assert len(solid.symmetries) == GROUPS[name][1]
     for rotation in solid.symmetries:
         turned = (points - solid.centroid) @ rotation.T + solid.centroid
         corners = solid.vertices[solid.triangles]

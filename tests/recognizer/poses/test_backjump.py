@@ -44,7 +44,7 @@ MODELS = [CUBE, L_BLOCK, HOLED]
 TESTS = [ModelTest(model, all_features(model)) for model in MODELS]
 
 
-def draw(rng: np.random.Generator, which: int) -> tuple[Touches, Contacts]:
+def draw_contacts(rng: np.random.Generator, which: int) -> tuple[Touches, Contacts]:
     """Contacts on anything of a model, noise in their bounds or on them, some without normals."""
     touches = touch_features(MODELS[which], TESTS[which].features, rng, int(rng.integers(3, 8)))
     bounds = float(rng.choice([3e-4, 3e-3])), float(rng.choice([0.02, 0.4, 1.0, 2.0]))
@@ -63,7 +63,7 @@ def is_open(test: ModelTest, faces: NDArray[np.int64], contacts: Contacts, R: Fl
 def test_no_rotation_near_enough_to_the_true_one_is_refused(which: int) -> None:
     rng = np.random.default_rng(which)
     for _ in range(300):
-        touches, contacts = draw(rng, which)
+        touches, contacts = draw_contacts(rng, which)
         axis, angle = rng.normal(size=3), float(rng.choice([0.0, 0.05, 0.5, 2.0]))
         off = Rotation.from_rotvec(angle / np.linalg.norm(axis) * axis)
         R = (touches.T_world_object.rotation * off).as_matrix()
@@ -119,7 +119,7 @@ def test_what_is_refused_is_what_plain_numpy_refuses() -> None:
 def test_no_branch_that_the_truth_is_on_is_rejected(which: int) -> None:
     rng, test = np.random.default_rng(10 + which), TESTS[which]
     for _ in range(60):
-        touches, contacts = draw(rng, which)
+        touches, contacts = draw_contacts(rng, which)
         count, faces = len(touches), touches.faces.astype(np.int64)
         faces[rng.random(count) < 0.2] = -1
         faces[0] = touches.faces[0]

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from helpers.constraints import NAMES, only
 from helpers.sensing import CUBE, HOLED, L_BLOCK, Touches, feel, forget_normals, touch_features
 from numpy.typing import NDArray
 from oracles import solids as oracles
@@ -41,13 +42,11 @@ from palpate.recognizer.poses.search.search_kernels import VAGUE
 from palpate.recognizer.tables.ranges import pack_tables
 from palpate.recognizer.tree.forward_kernels import check_forward, take_lowest
 from palpate.recognizer.tree.mask_kernels import pair_readings
-from palpate.recognizer.tree.tree import Constraints
 
 Bools = NDArray[np.bool_]
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-NAMES = ["distance", "angle", "component", "tilt"]
 FLAT = [CUBE, L_BLOCK, HOLED, oracles.model("stapler"), oracles.model("hull-90")]
 MODELS = FLAT + FLAT[:4]
 TESTS = [ModelTest(m) for m in FLAT] + [ModelTest(m, all_features(m)) for m in FLAT[:4]]
@@ -63,7 +62,7 @@ def prepared(which: int) -> tuple[Touches, PairTables, Floats]:
 
 
 @dataclass(frozen=True, eq=False)
-class Sample:
+class BranchSample:
     """Contacts whose truth is known, and a branch and a cell of rotations that hold it."""
 
     which: int
@@ -81,7 +80,7 @@ class Sample:
         return np.arange(len(TESTS[self.which].features)) == self.truth[:, None]
 
 
-def draw(rng: np.random.Generator, which: int, in_cell: bool) -> Sample:
+def draw_branch(rng: np.random.Generator, which: int, in_cell: bool) -> BranchSample:
     """Contacts inside their bounds or on them, the first ones good to more or less than others."""
     touches = prepared(which)[0][rng.integers(200, size=rng.integers(3, 11))]
     count, noise = len(touches), int(rng.integers(3))
@@ -95,7 +94,7 @@ def draw(rng: np.random.Generator, which: int, in_cell: bool) -> Sample:
     axis, angle = rng.normal(size=3), rng.choice([0.001, 0.04, 0.4, 1.0])
     off = Rotation.from_rotvec((1.0 - 1e-9) * angle / np.linalg.norm(axis) * axis)
     cell = (touches.T_world_object.rotation * off).as_matrix(), angle if in_cell else -1.0
-    return Sample(which, truth, contacts, depth, faces, cell)
+    return BranchSample(which, truth, contacts, depth, faces, cell)
 
 
 def as_bits(members: Bools) -> NDArray[np.uint64]:
@@ -124,7 +123,7 @@ def test_the_lowest_features_of_a_set_come_out_in_ascending_order() -> None:
         assert take_lowest(left) == -1
 
 
-def fitting(sample: Sample, names: list[str], i: int, j: int, a: int) -> Bools:
+def faces_that_fit(sample: BranchSample, names: list[str], i: int, j: int, a: int) -> Bools:
     """(f,) which faces contact j can be on if contact i is on ``a``."""
     table, contacts, (rotation, angle) = prepared(sample.which)[1], sample.contacts, sample.cell
     margins = [oracles.pair_margins(table, contacts, i, j, tuple(names))[a]]
@@ -140,12 +139,12 @@ def fitting(sample: Sample, names: list[str], i: int, j: int, a: int) -> Bools:
     return np.min(margins, axis=0) >= 0.0
 
 
-def what_is_read(sample: Sample, names: list[str]) -> tuple[Any, Any]:
+def what_is_read(sample: BranchSample, names: list[str]) -> tuple[Any, Any]:
     """What `check_forward` reads of contacts and model."""
     count, test, contacts = len(sample.truth), TESTS[sample.which], sample.contacts
     readings, errors = np.empty((count, count, 9)), contacts.normal_error
     pair_readings(kernel_contacts(contacts), errors, readings)
-    bits = Constraints(**{name: name in names for name in NAMES}).bits
+    bits = only(names).bits
     between = (contacts.positions - contacts.positions[:, None]) @ sample.cell[0]
     packed, half = prepared(sample.which)[2], test.features.half_angles
     return (packed, half, errors, bits, test.model[0], readings), (between, sample.cell[1])
@@ -155,7 +154,7 @@ def test_checking_forward_does_what_a_plain_loop_over_pairs_does() -> None:
     rng, seen = np.random.default_rng(3), Counter()
     for case in range(600):
         in_cell, names = bool(rng.random() < 0.5), [n for n in NAMES if rng.random() < 0.7]
-        sample = draw(rng, case % len(FLAT), in_cell)
+        sample = draw_branch(rng, case % len(FLAT), in_cell)
         count, features = sample.true.shape
         i, room = int(rng.integers(count - 1)), int(rng.integers(3))
         first = int(rng.integers(i + 1, count + 1))
@@ -167,7 +166,7 @@ def test_checking_forward_does_what_a_plain_loop_over_pairs_does() -> None:
         kept, kept_sizes = (domains, sizes) if case % 2 else (as_bits(expected), sizes - 7)
         expected_sizes, empty, ways = kept_sizes.copy(), 0, 1.0
         for j in range(first, count):
-            fits = fitting(sample, names, i, j, face) if face >= 0 else True
+            fits = faces_that_fit(sample, names, i, j, face) if face >= 0 else True
             expected[j] = members[j] & fits
             expected_sizes[j] = expected[j].sum()
             ways *= max(1, expected_sizes[j])
@@ -188,7 +187,7 @@ def test_checking_forward_does_what_a_plain_loop_over_pairs_does() -> None:
 # Regions and verdicts
 
 
-def look(sample: Sample, kernel: str, members: Bools, certain: bool = False) -> Bools:
+def look(sample: BranchSample, kernel: str, members: Bools, certain: bool = False) -> Bools:
     """The sets that a kernel leaves of these, from a pose as the search comes to it.
 
     By the cell's rotation or by the normals; where it is vague, the search doesn't look ahead.
@@ -218,7 +217,7 @@ def look(sample: Sample, kernel: str, members: Bools, certain: bool = False) -> 
         held = np.empty(len(faces), np.int64), *blank[:0:-1]
         assert drop_rejected(*branch[:2], certain, *known, held) == tried
     for i in range(sample.depth if kernel == "pairs" else 0):
-        read, sets = what_is_read(sample, NAMES), (domains, sizes)
+        read, sets = what_is_read(sample, list(NAMES)), (domains, sizes)
         check_forward(i, faces[i], sample.depth, len(faces), *read, *sets, *sets)
     left = members_of(domains, members.shape[1])
     np.testing.assert_array_equal(sizes, left.sum(axis=1))
@@ -231,7 +230,7 @@ def look(sample: Sample, kernel: str, members: Bools, certain: bool = False) -> 
 def test_looking_ahead_drops_impossible_features_alone(kernel: str, in_cell: bool) -> None:
     rng, seen = np.random.default_rng(5), Counter()
     for case in range(1500 if in_cell else 600):
-        sample, certain = draw(rng, case % len(TESTS), in_cell), bool(rng.random() < 0.6)
+        sample, certain = draw_branch(rng, case % len(TESTS), in_cell), bool(rng.random() < 0.6)
         members = sample.true | (rng.random(sample.true.shape) < rng.choice([0.0, 0.1, 0.5]))
         left, depth, felt = look(sample, kernel, members, certain), sample.depth, sample.contacts
         assert left[sample.true].all(), f"case {case}: a true feature was dropped"
@@ -267,7 +266,7 @@ def test_a_contact_that_may_be_on_none_takes_no_truth_away(choices: int) -> None
     members = np.ones((7, 6), np.bool_)
     members[5] = np.isin(range(6), [right, top][:choices])
     for certain, expected in ((False, [left]), (True, [])):
-        found = look(Sample(0, truth, contacts, 5, truth), "verdicts", members, certain)
+        found = look(BranchSample(0, truth, contacts, 5, truth), "verdicts", members, certain)
         assert np.flatnonzero(found[5]).tolist() == [right]
         assert np.flatnonzero(found[6]).tolist() == expected
 
@@ -278,7 +277,7 @@ def test_a_contact_that_may_be_on_none_takes_no_truth_away(choices: int) -> None
 def test_places_are_widened_by_the_remainder_of_a_region() -> None:
     rng = np.random.default_rng(7)
     for _ in range(100):
-        table, root = places(rng), np.tril(rng.normal(size=(3, 3)))
+        table, root = place_table(rng), np.tril(rng.normal(size=(3, 3)))
         _, columns, numbers = table
         angle, expected = rng.uniform(0.0, np.pi), numbers.copy()
         for r in range(5):
@@ -291,7 +290,7 @@ def test_places_are_widened_by_the_remainder_of_a_region() -> None:
 def test_places_add_the_squares_of_what_motions_leave_of_them() -> None:
     rng = np.random.default_rng(8)
     for _ in range(100):
-        rows, _, numbers = table = places(rng)
+        rows, _, numbers = table = place_table(rng)
         system, slope = rng.normal(size=(6, 6)), rng.normal(size=6)
         added, steeper = system.copy(), slope.copy()
         allowed = add_places(5, table, added, steeper)
@@ -334,7 +333,7 @@ def test_cones_add_no_more_than_what_turns_leave_of_their_misses() -> None:
 def test_readings_count_by_how_large_a_motion_leaves_them() -> None:
     rng = np.random.default_rng(10)
     for _ in range(50):
-        rows, _, numbers = table = places(rng)
+        rows, _, numbers = table = place_table(rng)
         motion, before = rng.normal(size=6), numbers[2].copy()
         raise_places(7, table, motion)
         left = np.abs(numbers[0] - rows @ motion) / numbers[3]
@@ -347,8 +346,8 @@ def test_readings_count_by_how_large_a_motion_leaves_them() -> None:
         np.testing.assert_allclose(weights, before * (np.minimum(left, 10.0) + 0.05))
 
 
-def places(rng: np.random.Generator) -> tuple[Floats, Floats, Floats]:
-    """A table of seven places as `place_table` has it, with levers and directions at random."""
+def place_table(rng: np.random.Generator) -> tuple[Floats, Floats, Floats]:
+    """A table of seven places as its kernel has it, with levers and directions at random."""
     levers, ways = rng.normal(size=(2, 7, 3))
     ways /= np.linalg.norm(ways, axis=1, keepdims=True)
     columns = np.column_stack([np.cross(levers, ways), ways, levers, (levers * ways).sum(axis=1)]).T

@@ -7,65 +7,21 @@ import itertools
 import numpy as np
 import pytest
 import trimesh
-from helpers.sensing import (
-    CUBE,
-    HOLED,
-    INCH,
-    L_BLOCK,
-    SMALL,
-    Touches,
-    exact,
-    feel,
-    move,
-    random_pose,
-    sense_grid,
-    touch_faces,
-)
+from helpers.sensing import CUBE, HOLED, INCH, L_BLOCK, SMALL, feel, sense_grid, touch_faces
+from helpers.witnesses import face_with_normal, witness_of
 from numpy.typing import NDArray
-from oracles import solids as oracles
 from oracles.checker import Oracle, check
 from oracles.geometry import angle_between
-from scipy.spatial.transform import RigidTransform, Rotation
+from oracles.proof_samples import STAND_INS
+from scipy.spatial.transform import RigidTransform
 
 from palpate.assets import STAND_IN_NAMES
-from palpate.envs.library import load_library
 from palpate.recognizer import Constraints, Contacts, PairTables, Polyhedron
-from palpate.recognizer.beliefs.extent_kernels import strain
-from palpate.recognizer.poses.fits.fit_kernels import fit_pose
-from palpate.recognizer.poses.fits.pose import ModelTest, Poses, kernel_contacts
-from palpate.recognizer.poses.fits.pose_kernels import finish, weigh
-from palpate.recognizer.poses.proofs.proof_kernels import workspace
+from palpate.recognizer.poses.fits.pose import ModelTest
 from palpate.recognizer.tree.tree import prune
 
 ROWS = ((np.pi / 12, 0.01), (np.pi / 10, 0.01), (np.pi / 8, 0.05), (np.pi / 8, 0.1))
 """Bounds on normals (radians) and positions (inches)."""
-
-STAND_INS = {model.name: model for model in load_library()}
-
-
-BAR = Polyhedron.from_mesh(oracles.box(0.3, 0.02, 0.015), name="bar")
-"""Long: nothing but the ends of its flanks says where along it a contact is."""
-FLANKS = np.flatnonzero(np.abs(BAR.normals[:, 0]) < 0.5).tolist()
-
-
-def pose_of(poses: Poses, row: int) -> RigidTransform:
-    return RigidTransform.from_components(
-        poses.translations[row], Rotation.from_matrix(poses.rotations[row])
-    )
-
-
-def centroid_and_turn_errors(
-    model: Polyhedron, pose: RigidTransform, truth: RigidTransform
-) -> tuple[float, float]:
-    shift = np.linalg.norm(pose.apply(model.centroid) - truth.apply(model.centroid))
-    return float(shift), float((pose.rotation.inv() * truth.rotation).magnitude())
-
-
-def face_with_normal(model: Polyhedron, direction: tuple[float, float, float], nth: int = 0) -> int:
-    return int(np.flatnonzero(model.normals @ direction > 0.999)[nth])
-
-
-# The samples themselves
 
 
 def test_the_small_objects_are_what_they_are_called() -> None:
@@ -92,11 +48,8 @@ def test_noise_at_the_bounds_is_at_the_bounds() -> None:
     touches = sense_grid(CUBE, rng, 3, 9)
     contacts = feel(touches, rng, 0.002, 0.3, at_bounds=True)
     apart = np.linalg.norm(contacts.positions - touches.points, axis=1)
-    np.testing.assert_allclose(apart, 0.002, rtol=1e-9)
+    np.testing.assert_allclose(apart, 0.002, rtol=2e-9)
     np.testing.assert_allclose(angle_between(contacts.normals, touches.normals), 0.3, atol=1e-8)
-
-
-# What is true survives
 
 
 @pytest.mark.parametrize("row", ROWS, ids=lambda row: f"pi:{np.pi / row[0]:.0f}-{row[1]}in")
@@ -114,13 +67,13 @@ def test_the_true_interpretation_is_never_rejected_and_gets_a_pose(
         assert len(poses) == 1, f"case {case}: the truth was rejected"
         if poses.proven[0]:
             proven += 1
-            assert check(model, pose_of(poses, 0), contacts, touches.faces).passed
+            assert check(model, witness_of(poses, 0), contacts, touches.faces).passed
     assert proven >= 34
 
 
 @pytest.mark.parametrize("count", [1, 2, 3])
 def test_very_few_contacts_keep_the_truth_too(count: int) -> None:
-    rng = np.random.default_rng([4, count])
+    rng, proven = np.random.default_rng([4, count]), 0
     for model in (*SMALL.values(), STAND_INS["stapler"]):
         test = ModelTest(model)
         for case in range(40):
@@ -130,7 +83,9 @@ def test_very_few_contacts_keep_the_truth_too(count: int) -> None:
             poses = test.run(touches.faces[None], contacts)
             assert len(poses) == 1
             if poses.proven[0]:
-                assert check(model, pose_of(poses, 0), contacts, touches.faces).passed
+                proven += 1
+                assert check(model, witness_of(poses, 0), contacts, touches.faces).passed
+    assert proven > 150
 
 
 @pytest.mark.parametrize("name", STAND_IN_NAMES)
@@ -162,14 +117,16 @@ def test_a_contact_whose_normal_is_hardly_known_still_counts_by_its_position(
     normal_error: float,
 ) -> None:
     rng = np.random.default_rng(5)
-    test = ModelTest(L_BLOCK)
+    test, proven = ModelTest(L_BLOCK), 0
     for _ in range(25):
         touches = touch_faces(L_BLOCK, rng, rng.integers(8, size=5).tolist())
         contacts = feel(touches, rng, 0.001, normal_error)
         poses = test.run(touches.faces[None], contacts)
         assert len(poses) == 1
         if poses.proven[0]:
-            assert check(L_BLOCK, pose_of(poses, 0), contacts, touches.faces).passed
+            proven += 1
+            assert check(L_BLOCK, witness_of(poses, 0), contacts, touches.faces).passed
+    assert proven > 20
 
 
 @pytest.mark.parametrize("edge", [0.0, 1e-9, 1e-15])
@@ -233,10 +190,7 @@ def test_the_size_of_an_object_does_not_matter(scale: float) -> None:
         poses = test.run(touches.faces[None], contacts)
         assert len(poses) == 1
         assert poses.proven[0]
-        assert check(model, pose_of(poses, 0), contacts, touches.faces).passed
-
-
-# What is proven holds
+        assert check(model, witness_of(poses, 0), contacts, touches.faces).passed
 
 
 @pytest.mark.parametrize("name", STAND_IN_NAMES)
@@ -251,7 +205,7 @@ def test_every_proven_pose_meets_every_bound(name: str) -> None:
         poses = test.run(candidates, contacts)
         rows = np.flatnonzero(poses.proven)
         for row in rng.permutation(rows)[:25]:
-            assert check(model, pose_of(poses, row), contacts, poses.faces[row]).passed
+            assert check(model, witness_of(poses, row), contacts, poses.faces[row]).passed
             checked += 1
     assert checked > 10
 
@@ -265,9 +219,6 @@ def test_kept_interpretations_keep_their_order_and_the_rest_is_gone() -> None:
     np.testing.assert_array_equal(poses.faces, touches.faces[None])
     assert len(poses.take(np.array([], np.intp))) == 0
     assert len(ModelTest(L_BLOCK).run(wrong, contacts)) == 0
-
-
-# What is rejected is impossible: an oracle that looks for poses everywhere
 
 
 def verdicts(
@@ -318,185 +269,8 @@ def test_no_pose_is_found_for_what_the_test_rejects_and_poses_are_for_what_it_ke
 @pytest.mark.parametrize("name", SMALL)
 def test_no_pose_is_found_for_many_that_the_test_rejects(name: str, seed: int) -> None:
     model, rng = SMALL[name], np.random.default_rng(seed)
-    for contacts, faces, keeps in verdicts(model, seed=100 + seed, wanted=60):
-        if not keeps:
-            assert not Oracle(model, contacts, faces).finds_a_pose(rng, 40)
-
-
-# What a pose is
-
-
-@pytest.mark.parametrize("name", STAND_IN_NAMES)
-def test_moving_the_contacts_moves_the_poses(name: str) -> None:
-    model, rng = STAND_INS[name], np.random.default_rng(12)
-    test, tables = ModelTest(model), PairTables.of(model)
-    compared = 0
-    for _ in range(8):
-        touches = sense_grid(model, rng)
-        contacts = feel(touches, rng, 0.02 * INCH, np.pi / 12)
-        motion = random_pose(rng)
-        moved = move(motion, contacts)
-        candidates = prune(tables, contacts, budget=200).faces
-        before, after = test.run(candidates, contacts), test.run(candidates, moved)
-        np.testing.assert_array_equal(before.faces, after.faces)
-        for row in range(len(before)):
-            if np.linalg.eigvalsh(before.informations[row])[0] < 1.0 / 0.003**2:
-                continue  # not determined: any witness will do
-            expected = motion * pose_of(before, row)
-            shift, turn = centroid_and_turn_errors(model, pose_of(after, row), expected)
-            assert shift < 1e-6
-            assert turn < 1e-5
-            compared += 1
-    assert compared >= 6
-
-
-@pytest.mark.parametrize("model", [*SMALL.values(), *STAND_INS.values()], ids=lambda m: m.name)
-def test_exact_contacts_on_all_faces_give_the_pose_back(model: Polyhedron) -> None:
-    rng, test = np.random.default_rng(13), ModelTest(model)
-    for _ in range(3):
-        touches = touch_faces(model, rng, list(range(model.face_count)))
-        poses = test.run(touches.faces[None], exact(touches, 1e-6, 1e-3))
-        assert poses.proven.all()
-        shift, turn = centroid_and_turn_errors(model, pose_of(poses, 0), touches.T_world_object)
-        assert shift < 1e-9
-        assert turn < 1e-8
-        assert poses.costs[0] < 1e-3  # a thousandth of a bound, here and there, is left
-
-
-def test_the_fit_does_not_drift_along_a_free_direction() -> None:
-    test, rng = ModelTest(BAR), np.random.default_rng(14)
-    for case in range(60):
-        faces = rng.choice(FLANKS, size=8).tolist()
-        touches = touch_faces(BAR, rng, faces)
-        contacts = feel(touches, rng, 0.001, np.pi / 8, at_bounds=case % 3 == 0)
-        poses = test.run(touches.faces[None], contacts)
-        assert poses.proven.all()
-        assert check(BAR, pose_of(poses, 0), contacts, touches.faces).passed
-
-
-def test_the_fit_brings_a_pose_back_that_slid_off_its_faces() -> None:
-    touches = touch_faces(BAR, np.random.default_rng(25), FLANKS * 10)
-    contacts = exact(touches, 0.001, 0.1)
-    for slide in (-0.1, 0.05, 0.2):
-        start = touches.T_world_object * RigidTransform.from_translation([slide, 0.0, 0.0])
-        rotation, translation = start.rotation.as_matrix(), start.translation.copy()
-        fit_pose(
-            len(contacts),
-            touches.faces.astype(np.int64),
-            kernel_contacts(contacts),
-            ModelTest(BAR).model,
-            20,
-            rotation,
-            translation,
-            workspace(len(contacts)),
-        )
-        end = RigidTransform.from_components(translation, Rotation.from_matrix(rotation))
-        assert not check(BAR, start, contacts, touches.faces).passed
-        assert check(BAR, end, contacts, touches.faces, tolerance=0.05).passed
-
-
-def test_a_witness_ends_nearest_to_the_best_fit_wherever_it_was_found() -> None:
-    rng, before, after = np.random.default_rng(12), [], []
-    for case in range(300):
-        model = list(SMALL.values())[case % len(SMALL)]
-        test = ModelTest(model)
-        touches = touch_faces(model, rng, rng.integers(0, model.face_count, 10).tolist())
-        contacts = feel(touches, rng, 1e-3, 0.2)
-        kernel, faces = kernel_contacts(contacts), touches.faces.astype(np.int64)
-        work, information = workspace(len(contacts)), np.empty((6, 6))
-        (shared,) = test.run(touches.faces[None], contacts).costs
-        rotation = touches.T_world_object.rotation.as_matrix()
-        translation = np.array(touches.T_world_object.translation)
-        # The truth is a witness; the best fit often is none.
-        question = (len(contacts), faces, kernel, test.model, rotation, translation, work)
-        found = weigh(*question, information)
-        cost = finish(*question, information)
-        assert cost <= found * (1.0 + 1e-9)
-        assert strain(faces, kernel, test.model, rotation, translation) <= 1.0 + 1e-8
-        before.append(found - shared)
-        after.append(cost - shared)
-    assert np.mean(np.abs(after)) < 0.5 * np.mean(np.abs(before))
-
-
-def test_two_contacts_farther_apart_than_a_face_is_long_are_not_both_on_it() -> None:
-    top = face_with_normal(BAR, (0, 0, 1))
-    faces = np.array([[top, top]], np.int32)
-    for length, kept in ((0.25, 1), (0.3, 1), (0.305, 0)):
-        contacts = Contacts(
-            [[0, 0, 0], [length, 0, 0]], [[0, 0, 1]] * 2, position_error=0.001, normal_error=0.1
-        )
-        # The face's diagonal is 0.30067; both bounds add to it.
-        assert ModelTest(BAR).run(faces, contacts).proven.sum() == kept
-
-
-@pytest.mark.parametrize(("u", "kept"), [(0.04, 0), (0.0215, 0), (0.0205, 1), (0.01, 1)])
-def test_a_contact_in_the_hole_of_a_face_is_not_on_that_face(u: float, kept: int) -> None:
-    top = face_with_normal(HOLED, (0, 0, 1))
-    sides = [face_with_normal(HOLED, s) for s in ((1, 0, 0), (-1, 0, 0), (0, 1, 0), (0, -1, 0))]
-    # Of the two faces that look along each axis, take the outer one.
-    outer = []
-    for face in sides:
-        alike = np.flatnonzero(HOLED.normals @ HOLED.normals[face] > 0.999)
-        outer.append(int(alike[np.argmax(HOLED.offsets[alike])]))
-    touches = touch_faces(HOLED, np.random.default_rng(15), [*outer, *outer, top, top, top])
-    points = touches.T_world_object.inv().apply(touches.points)
-    points = np.vstack([points, [[u, 0.03, 0.025]]])
-    faces = np.append(touches.faces, top).astype(np.int32)
-    for seed in range(3):
-        pose = random_pose(np.random.default_rng(seed))
-        again = Touches(pose, pose.apply(points), pose.rotation.apply(HOLED.normals[faces]), faces)
-        contacts = exact(again, position_error=5e-4)
-        assert len(ModelTest(HOLED).run(faces[None], contacts)) == kept
-
-
-def test_a_contact_in_the_notch_of_a_concave_face_is_not_on_that_face() -> None:
-    top = face_with_normal(L_BLOCK, (0, 0, 1))
-    hull = L_BLOCK.hulls.corners[L_BLOCK.hulls.start[top] : L_BLOCK.hulls.start[top + 1]]
-    notch = np.array([0.027, 0.027, 0.03])
-    ahead = np.roll(hull, -1, axis=0) - hull
-    assert ((np.cross(ahead, notch - hull) @ [0, 0, 1]) > 0.0).all()  # inside the hull
-    others = [face for face in range(8) if face != top]
-    touches = touch_faces(L_BLOCK, np.random.default_rng(16), others * 2, RigidTransform.identity())
-    faces = np.append(touches.faces, top).astype(np.int32)
-    for point, kept in ((notch, 0), (np.array([0.027, 0.01, 0.03]), 1)):
-        again = Touches(
-            touches.T_world_object,
-            np.vstack([touches.points, point]),
-            L_BLOCK.normals[faces],
-            faces,
-        )
-        assert len(ModelTest(L_BLOCK).run(faces[None], exact(again, 5e-4))) == kept
-
-
-def test_the_information_is_that_of_small_motions() -> None:
-    # Against the second difference of a misfit written down anew.
-    rng, model = np.random.default_rng(17), L_BLOCK
-    touches = touch_faces(model, rng, [0, 1, 2, 3, 4, 5, 6, 7])
-    contacts = exact(touches, 1e-3, 0.2)
-    poses = ModelTest(model).run(touches.faces[None], contacts)
-    radius, pose = model.diameter / 2.0, touches.T_world_object
-
-    def misfit(step: NDArray[np.float64]) -> float:
-        turn = Rotation.from_rotvec(step[:3] / radius)
-        shift = model.centroid + step[3:] - turn.apply(model.centroid)
-        moved = pose * RigidTransform.from_components(shift, turn)
-        felt = move(moved.inv(), contacts)
-        normals, offsets = model.normals[touches.faces], model.offsets[touches.faces]
-        heights = (normals * felt.positions).sum(1) - offsets
-        tilts = ((felt.normals - normals) ** 2).sum(1)
-        return float((5.0 * heights**2 / 1e-3**2 + 4.0 * tilts / 0.2**2).sum())
-
-    step = 1e-6
-    axes = step * np.eye(6)
-    expected = np.array(
-        [
-            [
-                (misfit(a + b) - misfit(a - b) - misfit(b - a) + misfit(-a - b)) / (8.0 * step**2)
-                for b in axes
-            ]
-            for a in axes
-        ]
-    )
-    found = poses.informations[0]
-    np.testing.assert_allclose(found, expected, atol=2e-3 * np.abs(expected).max())
-    np.testing.assert_array_equal(found, found.T)
+    cases = verdicts(model, seed=100 + seed, wanted=60)
+    rejected = [(contacts, faces) for contacts, faces, keeps in cases if not keeps]
+    assert len(rejected) == 60
+    for contacts, faces in rejected:
+        assert not Oracle(model, contacts, faces).finds_a_pose(rng, 40)

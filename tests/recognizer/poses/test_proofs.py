@@ -22,8 +22,8 @@ from oracles.proof_samples import (
     hasty,
     motion_to,
     read_at,
+    rotation_near,
     start_near,
-    turned,
 )
 from scipy.spatial.transform import RigidTransform, Rotation
 
@@ -128,7 +128,7 @@ def test_a_ball_of_rotations_fits_into_its_ball_of_rotation_vectors() -> None:
         longest = min(np.pi, off + angle)
         radius = ball_radius(angle, longest)
         centre = off * direction(rng)
-        inside = turned(Rotation.from_rotvec(centre), angle, rng).as_rotvec()
+        inside = rotation_near(Rotation.from_rotvec(centre), angle, rng).as_rotvec()
         middle = np.zeros(3) if longest >= 0.5 * np.pi else centre
         left = radius - np.linalg.norm(inside - middle)
         assert left > -1e-8

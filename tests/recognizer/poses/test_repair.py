@@ -26,7 +26,7 @@ def bounds_about(case: Case) -> tuple[Polyhedron, Bounds]:
     return case.model, bounds_of(case.model, face_features(case.model), case.contacts, known)
 
 
-def parts_of(pose: RigidTransform) -> tuple[Floats, Floats]:
+def as_arrays(pose: RigidTransform) -> tuple[Floats, Floats]:
     return pose.rotation.as_matrix(), np.array(pose.translation)
 
 
@@ -34,7 +34,7 @@ def moved(rng: np.random.Generator, bounds: Bounds, pose: RigidTransform, by: fl
     """A pose off by so many bounds on a position, in some direction."""
     step = rng.normal(size=6)
     step *= by * bounds.contacts[2].max() / np.linalg.norm(step)
-    return apply_motion(*parts_of(pose), step, bounds.model[5], bounds.model[6])
+    return apply_motion(*as_arrays(pose), step, bounds.model[5], bounds.model[6])
 
 
 @pytest.mark.parametrize("kind", ["free", "support", "approaches"])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from helpers.pose_samples import pose_of, samples_at
 from oracles.solids import SOLIDS, model, random_pose
 from scipy.spatial.transform import RigidTransform, Rotation
 
@@ -48,24 +49,8 @@ def plain_predictions(samples: PoseSamples, rays: TriadRays) -> Predictions:
     )
 
 
-def pose_of(samples: PoseSamples, row: int) -> RigidTransform:
-    turn = Rotation.from_quat(samples.rotations[row])
-    return RigidTransform.from_components(samples.positions[row], turn)
-
-
-def samples_at(solids: list[Polyhedron], poses: list[RigidTransform], **spreads) -> PoseSamples:
-    """Poses of solids in turn, equally likely."""
-    count = len(poses)
-    return PoseSamples(
-        tuple(solids),
-        np.arange(count) % len(solids),
-        np.arange(count),
-        np.array([pose.translation for pose in poses]),
-        np.array([pose.rotation.as_quat() for pose in poses]),
-        np.full(count, 1.0 / count),
-        np.full(count, spreads.get("shift", 0.001)),
-        np.full(count, spreads.get("turn", 0.02)),
-    )
+SPREADS = {"spread": 0.001, "turn": 0.02}
+"""Of shifts, metres, and of turns, radians."""
 
 
 def about_the_origin(solid: Polyhedron, rng: np.random.Generator) -> RigidTransform:
@@ -95,7 +80,7 @@ def agree(found: Predictions, wanted: Predictions, size: float) -> None:
 @pytest.mark.parametrize("name", [*SOLIDS, *STAND_IN_NAMES])
 def test_predictions_are_those_of_casting_every_ray_against_every_triangle(name):
     solid, rng = model(name), np.random.default_rng(0)
-    samples = samples_at([solid], [about_the_origin(solid, rng) for _ in range(6)])
+    samples = samples_at([solid], [about_the_origin(solid, rng) for _ in range(6)], **SPREADS)
     rays = triads(solid, 60, rng)
     found, wanted = predict(samples, rays), plain_predictions(samples, rays)
     agree(found, wanted, solid.diameter)
@@ -105,7 +90,10 @@ def test_predictions_are_those_of_casting_every_ray_against_every_triangle(name)
 def test_a_library_is_predicted_as_its_objects_are():
     solids, rng = [model(name) for name in STAND_IN_NAMES], np.random.default_rng(1)
     poses = [about_the_origin(solids[row % len(solids)], rng) for row in range(12)]
-    samples, rays = samples_at(solids, poses), triads(solids[-1], 70, rng)
+    samples, rays = (
+        samples_at(solids, poses, objects=np.arange(12) % len(solids), **SPREADS),
+        triads(solids[-1], 70, rng),
+    )
     agree(predict(samples, rays), plain_predictions(samples, rays), solids[-1].diameter)
 
 
@@ -117,7 +105,7 @@ def test_the_size_of_the_world_does_not_matter(size):
 
     mesh = trimesh.Trimesh(small.vertices * scale, small.triangles, process=False)
     solid = Polyhedron.from_mesh(mesh, name="scaled")
-    samples = samples_at([solid], [about_the_origin(solid, rng) for _ in range(4)], shift=0.0)
+    samples = samples_at([solid], [about_the_origin(solid, rng) for _ in range(4)], turn=0.02)
     rays = triads(solid, 50, rng)
     agree(predict(samples, rays), plain_predictions(samples, rays), solid.diameter)
 
@@ -135,7 +123,7 @@ def test_rays_through_edges_and_corners_meet_the_solid():
         rays = TriadRays(
             (rows - 5.0 * down).reshape(-1, 3, 3), np.tile(down, (len(rows) // 3, 3, 1))
         )
-        found = predict(samples_at([solid], [pose]), rays)
+        found = predict(samples_at([solid], [pose], **SPREADS), rays)
         assert (found.outcomes == MET_OBJECT).all()
 
 
@@ -144,7 +132,7 @@ def test_what_lies_below_the_plane_or_behind_the_start_is_not_met():
     below = RigidTransform.from_translation([-0.5, -0.5, -1.2])
     behind = RigidTransform.from_translation([-0.5, -0.5, 40.0])
     rays = ProbeSpace(1.0, 5.0).rays(np.zeros((1, 3)))
-    found = predict(samples_at([solid], [below, behind]), rays)
+    found = predict(samples_at([solid], [below, behind], **SPREADS), rays)
     assert (found.outcomes == MET_PLANE).all()
     np.testing.assert_allclose(found.depths, 5.0)
     np.testing.assert_array_equal(found.normals_world[..., 2], 1.0)
@@ -155,7 +143,7 @@ def test_the_spread_of_depths_is_that_of_poses_moved_at_random():
     solid, rng = model("tetrahedron"), np.random.default_rng(4)
     pose, rays = about_the_origin(solid, rng), triads(solid, 25, rng)
     shift, turn, many = 2e-4 * solid.diameter, 5e-4, 1500
-    predicted = predict(samples_at([solid], [pose], shift=shift, turn=turn), rays)
+    predicted = predict(samples_at([solid], [pose], spread=shift, turn=turn), rays)
     centre = pose.apply(solid.centroid)
     moved = []
     for _ in range(many):
@@ -164,7 +152,7 @@ def test_the_spread_of_depths_is_that_of_poses_moved_at_random():
             centre - rotation.apply(centre) + shift * rng.normal(size=3), rotation
         )
         moved.append(about * pose)
-    drawn = predict(samples_at([solid], moved), rays)
+    drawn = predict(samples_at([solid], moved, **SPREADS), rays)
     normals = drawn.normals_world @ np.ones(3)
     steady = (drawn.outcomes == MET_OBJECT).all(axis=0) & (normals.std(axis=0) < 3.0 * turn)
     assert steady.sum() > 10
@@ -176,7 +164,9 @@ def test_a_balls_centre_stops_a_radius_off_the_face_that_it_meets():
     solid, radius = model("cube"), 0.05
     pose = RigidTransform.from_translation([-0.5, -0.5, -0.5])
     rays = ProbeSpace(0.2, 5.0).rays(np.random.default_rng(5).uniform(-1.0, 1.0, (40, 3)))
-    point, ball = (predict(samples_at([solid], [pose]), rays, radius=r) for r in (0.0, radius))
+    point, ball = (
+        predict(samples_at([solid], [pose], **SPREADS), rays, radius=r) for r in (0.0, radius)
+    )
     met = point.outcomes == MET_OBJECT
     assert met.any()
     np.testing.assert_array_equal(ball.outcomes[met], MET_OBJECT)
@@ -194,7 +184,7 @@ def test_no_samples_and_no_rays_predict_nothing():
     assert predict(PoseSamples.none([solid]), rays).depths.shape == (0, 2, 3)
     none = ProbeSpace(1.0, 5.0).rays(np.zeros((0, 3)))
     pose = RigidTransform.identity()
-    assert predict(samples_at([solid], [pose]), none).normals_world.shape == (1, 0, 3, 3)
+    assert predict(samples_at([solid], [pose], **SPREADS), none).normals_world.shape == (1, 0, 3, 3)
 
 
 def test_a_radius_below_zero_is_refused():

@@ -7,12 +7,13 @@ import inspect
 import itertools
 import os
 import subprocess
-import sys
 from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.forbidding import forbid
+from helpers.processes import python
 from oracles.solids import SOLIDS, model
 
 from palpate.assets import STAND_IN_NAMES
@@ -23,33 +24,20 @@ from palpate.recognizer.tables import file_cache, table_cache
 from palpate.recognizer.tables.table_cache import cached_tables, default_folder, table_key
 
 
-def same(one: PairTables, other: PairTables) -> bool:
+def same_tables(one: PairTables, other: PairTables) -> bool:
     pairs = [(getattr(one, f.name), getattr(other, f.name)) for f in fields(PairTables)]
     return all(a.dtype == b.dtype and np.array_equal(a, b) for a, b in pairs)
 
 
-@pytest.fixture
-def nothing_is_built(monkeypatch):
-    """Call to forbid building from here on."""
-
-    def forbid():
-        def complain(solid):
-            raise AssertionError(f"{solid.name} was built again")
-
-        monkeypatch.setattr(PairTables, "of", complain)
-
-    return forbid
-
-
 @pytest.mark.parametrize("name", ["cube", "holed", "hull-90", "housing"])
-def test_tables_read_are_those_that_were_built_and_are_built_once(name, tmp_path, nothing_is_built):
+def test_tables_read_are_those_that_were_built_and_are_built_once(name, tmp_path, monkeypatch):
     solid = model(name)
     expected = PairTables.of(solid)
     built = cached_tables(solid, tmp_path)
-    nothing_is_built()
+    forbid(monkeypatch, PairTables, "of")
     found = cached_tables(replace(solid, name="of another name"), tmp_path)
-    assert same(built, expected)
-    assert same(found, expected)
+    assert same_tables(built, expected)
+    assert same_tables(found, expected)
     assert len(list(tmp_path.iterdir())) == 1
 
 
@@ -76,20 +64,20 @@ def test_a_damaged_file_is_built_anew_and_mended(tmp_path):
         damaged.append(bytes(flipped))
     for content in damaged:
         path.write_bytes(content)
-        assert same(cached_tables(solid, tmp_path), expected)
+        assert same_tables(cached_tables(solid, tmp_path), expected)
         assert path.read_bytes() == whole
 
 
 def test_a_write_that_was_killed_leaves_nothing_that_is_read(tmp_path):
     killed = (
-        "import os, signal, sys; from pathlib import Path; from oracles import model\n"
+        "import os, signal, sys; from pathlib import Path; from oracles.solids import model\n"
         "from palpate.recognizer.tables.table_cache import cached_tables\n"
         "os.replace = lambda *_: os.kill(os.getpid(), signal.SIGKILL)\n"
         "cached_tables(model('cube'), Path(sys.argv[1]))\n"
     )
     assert run(killed, tmp_path).wait(timeout=60) < 0
     assert [path.suffix for path in tmp_path.iterdir()] == [".part"]
-    assert same(cached_tables(model("cube"), tmp_path), PairTables.of(model("cube")))
+    assert same_tables(cached_tables(model("cube"), tmp_path), PairTables.of(model("cube")))
     assert sorted(path.suffix for path in tmp_path.iterdir()) == [".part", ".tables"]
 
 
@@ -106,14 +94,14 @@ def test_a_write_that_fails_leaves_no_file(tmp_path, monkeypatch):
 
 def test_two_processes_at_once_always_get_whole_tables(tmp_path):
     busy = (
-        "import sys; from pathlib import Path; from oracles import model\n"
-        "from test_table_cache import same\n"
+        "import sys; from pathlib import Path; from oracles.solids import model\n"
+        "from test_table_cache import same_tables\n"
         "from palpate.recognizer import PairTables\n"
         "from palpate.recognizer.tables.table_cache import cached_tables, table_key\n"
         "solid, folder = model('l-block'), Path(sys.argv[1])\n"
         "expected, path = PairTables.of(solid), folder / (table_key(solid) + '.tables')\n"
         "for turn in range(150):\n"
-        "    assert same(cached_tables(solid, folder), expected)\n"
+        "    assert same_tables(cached_tables(solid, folder), expected)\n"
         "    if turn % 3 == 0: path.unlink(missing_ok=True)\n"
         "    if turn % 7 == 0: path.write_bytes(b'half')\n"
     )
@@ -123,10 +111,8 @@ def test_two_processes_at_once_always_get_whole_tables(tmp_path):
 
 
 def run(code: str, folder: Path) -> subprocess.Popen[bytes]:
-    """Start Python on a piece of code, among the tests' own modules."""
-    here = str(Path(__file__).parent)
-    before = f"import sys; sys.path.insert(0, {here!r})\n"
-    return subprocess.Popen([sys.executable, "-c", before + code, str(folder)])
+    """Start Python on a piece of code, which is told a folder."""
+    return subprocess.Popen(python(code, str(folder), beside=__file__))
 
 
 def test_a_folder_that_cannot_be_written_is_said_once_and_costs_no_more(tmp_path):
@@ -138,16 +124,16 @@ def test_a_folder_that_cannot_be_written_is_said_once_and_costs_no_more(tmp_path
         found = [cached_tables(model(name), in_the_way / "tables") for name in names]
     assert len(told) == 1
     for name, tables in zip(names, found, strict=True):
-        assert same(tables, PairTables.of(model(name)))
+        assert same_tables(tables, PairTables.of(model(name)))
         assert not tables.angle.flags.writeable
 
 
-def test_the_default_folder_is_in_the_users_cache(tmp_path, monkeypatch, nothing_is_built):
+def test_the_default_folder_is_in_the_users_cache(tmp_path, monkeypatch):
     monkeypatch.setattr("platformdirs.user_cache_path", lambda *_, **__: tmp_path / "palpate")
     assert default_folder() == tmp_path / "palpate" / "tables"
     cached_tables(model("cube"))
     assert len(list((tmp_path / "palpate" / "tables").iterdir())) == 1
-    nothing_is_built()
+    forbid(monkeypatch, PairTables, "of")
     cached_tables(model("cube"))
 
 
@@ -155,7 +141,7 @@ def test_without_a_home_directory_nothing_is_kept(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("platformdirs.user_cache_path", lambda *_, **__: Path("~/.cache/palpate"))
     assert default_folder() is None
-    assert same(cached_tables(model("cube")), PairTables.of(model("cube")))
+    assert same_tables(cached_tables(model("cube")), PairTables.of(model("cube")))
     assert list(tmp_path.iterdir()) == []
 
 
@@ -190,18 +176,17 @@ def test_tables_over_edges_and_vertices_have_a_file_of_their_own(tmp_path):
         cached_tables(solid, tmp_path, features=features),
     )
     assert len(list(tmp_path.iterdir())) == 2
-    assert same(faces, PairTables.of(solid))
-    assert same(everything, PairTables.of(solid, features))
-    assert same(cached_tables(solid, tmp_path, features=features), everything)
+    assert same_tables(faces, PairTables.of(solid))
+    assert same_tables(everything, PairTables.of(solid, features))
+    assert same_tables(cached_tables(solid, tmp_path, features=features), everything)
 
 
-def test_a_models_own_arrays_stay_writable(tmp_path):
+def test_tables_share_no_memory_with_the_models_own_arrays(tmp_path):
     solid = Polyhedron.from_mesh(SOLIDS["cube"]())
     for _ in range(2):
         tables = cached_tables(solid, tmp_path)
         for field in fields(PairTables):
             for own in (solid.normals, solid.hulls.corners, solid.hulls.start):
-                assert own.flags.writeable
                 assert not np.shares_memory(own, getattr(tables, field.name))
 
 
@@ -209,11 +194,15 @@ def test_every_module_that_tables_are_built_by_is_part_of_the_key():
     # A model's own arrays are hashed, and what triples add is built from the tables each time.
     harmless = {"polyhedron", "triples"}
     named = {module.__name__.rpartition(".")[2] for module in table_cache.BUILDERS}
+    imported = 0
     for module in table_cache.BUILDERS:
         for node in ast.walk(ast.parse(inspect.getsource(module))):
             if isinstance(node, ast.ImportFrom) and node.level:
-                names = [node.module] if node.module else [alias.name for alias in node.names]
-                assert set(names) <= named | harmless, module.__name__
+                paths = [node.module] if node.module else [alias.name for alias in node.names]
+                names = {path.rpartition(".")[2] for path in paths}
+                assert names <= named | harmless, module.__name__
+                imported += 1
+    assert imported > 3
 
 
 def test_a_changed_way_of_building_changes_the_key(monkeypatch):
