@@ -65,7 +65,7 @@ def met(solid: Polyhedron, pose: RigidTransform, start, direction) -> tuple[floa
     return depth, int(solid.triangle_faces[triangle]) if triangle >= 0 else -1
 
 
-def touched(one: Suggestion, pose: RigidTransform, rng: np.random.Generator):
+def touch_as_suggested(one: Suggestion, pose: RigidTransform, rng: np.random.Generator):
     """What a touch of the l-block reports: contacts, free space and the face it is truly on."""
     start, direction = one.start_world, one.direction_world
     depth, face = met(LIBRARY[0], pose, start, direction)
@@ -124,7 +124,9 @@ def ambiguous(seed: int) -> tuple[Session, Belief]:
 @pytest.mark.parametrize("seed", range(6))
 def test_what_rivals_are_said_to_report_is_what_rays_cast_at_them_meet(seed):
     session, belief = ambiguous(seed)
-    for one in session.suggest(4):
+    named = session.suggest(4)
+    assert len(named) == 4
+    for one in named:
         said = [
             (report, rival, k)
             for report in one.reports
@@ -142,7 +144,9 @@ def test_what_rivals_are_said_to_report_is_what_rays_cast_at_them_meet(seed):
 @pytest.mark.parametrize("seed", range(6))
 def test_the_weights_of_rivals_are_the_chances_of_their_reports(seed):
     session, belief = ambiguous(seed)
-    for one in session.suggest(3):
+    named = session.suggest(3)
+    assert len(named) == 3
+    for one in named:
         assert sum(report.chance for report in one.reports) == pytest.approx(1.0)
         for report in one.reports:
             weight = sum(belief.hypotheses[k].weight for r in report.rivals for k in r.hypotheses)
@@ -197,7 +201,7 @@ def test_suggested_touches_keep_the_truth_and_leave_fewer_rivals_than_random_one
             rng = np.random.default_rng(100 + seed)
             for _ in range(2):
                 named = session.suggest(1) if kind == "suggested" else at_random(session, pose, rng)
-                contacts, ways, more = touched(named[0], pose, rng)
+                contacts, ways, more = touch_as_suggested(named[0], pose, rng)
                 session.add(contacts, free_space=ways)
                 faces = faces + more
                 assert holds(session.belief, faces)
@@ -228,7 +232,7 @@ def test_once_it_is_unique_touches_refine_the_pose_and_do():
     one, *_ = named = session.suggest(3)
     assert {each.purpose for each in named} == {Purpose.REFINE}
     assert [len(each.reports) for each in named] == [1, 1, 1]
-    contacts, ways, more = touched(one, pose, np.random.default_rng(0))
+    contacts, ways, more = touch_as_suggested(one, pose, np.random.default_rng(0))
     after = session.add(contacts, free_space=ways)
     assert holds(after, faces + more)
     assert after is not None
@@ -240,7 +244,9 @@ def test_touches_stay_in_the_region_and_along_the_directions():
     session, pose, _ = begun(3, 4)
     middle = pose.apply(LIBRARY[0].centroid)
     region = Region(middle - 1.0, middle + [0.5, 0.6, 0.7])
-    for one in session.suggest(8, region=region, directions=[AXES["-x"], (0.0, 0.0, -2.0)]):
+    named = session.suggest(8, region=region, directions=[AXES["-x"], (0.0, 0.0, -2.0)])
+    assert len(named) > 3
+    for one in named:
         assert one.direction_world.tolist() in ([-1.0, 0.0, 0.0], [0.0, 0.0, -1.0])
         for end in (one.start_world, one.end_world):
             assert (end >= region.low - 1e-9).all()
