@@ -38,7 +38,7 @@ def under_a_bar(
         console: where to draw, if it is a terminal; none, and nothing is drawn.
         done: how many were there before.
     """
-    console = console or Console(quiet=True)
+    shown = console or Console(quiet=True)
     with Progress(
         TextColumn("{task.description}"),
         BarColumn(),
@@ -46,10 +46,10 @@ def under_a_bar(
         TimeElapsedColumn(),
         TextColumn("left:"),
         TimeRemainingColumn(),
-        console=console,
+        console=shown,
         auto_refresh=False,
         transient=True,
-        disable=not console.is_terminal,
+        disable=not shown.is_terminal,
     ) as bar:
         task = bar.add_task(label, total=total, completed=done)
         bar.refresh()

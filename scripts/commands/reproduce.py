@@ -84,7 +84,7 @@ def reproduce(
     # Only now: what these import reads the number of threads once.
     from rich.console import Console
 
-    from ..memo.page import verdict, write_page
+    from ..memo.page import verdict, write_sections
     from ..memo.pool import open_plan, processors
 
     console = Console(highlight=False)
@@ -98,7 +98,7 @@ def reproduce(
     sections.sort(key=lambda section: ORDER.index(section.name))
     console.print(verdict(sections), soft_wrap=True)
     if out is not None:
-        stem = write_page(sections, command(experiments, trials, seed), out, trials)
+        stem = write_sections(sections, command(experiments, trials, seed), out, trials)
         console.print(f"{stem}.html, .md and .json", soft_wrap=True)
 
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..report.page import Figure, Paragraph, Table
+from ..report.markdown import Table
 from .judge import COUNTS, Four, figure, four
-from .section import Comparison, Plan, Section
+from .section import Comparison, Figure, Plan, Section
 from .trial import BATCH, Spec, prepared
 
 TRIALS = 100
@@ -99,7 +99,7 @@ def run(plan: Plan) -> Section:
         found=_found(fours),
         blocks=(
             _table(fours),
-            Paragraph(
+            (
                 f"Cells are median / 90th percentile; {LIMIT:,} means that or more. The line that"
                 " stands out is what palpate prunes with."
             ),
@@ -180,7 +180,7 @@ def _table(fours: Mapping[Spec, Mapping[str, Four]]) -> Table:
         [name, *(f"{figure(sets[name][1])} / {figure(sets[name][2])}" for sets in fours.values())]
         for name in SETS
     ]
-    return Table(heads, rows, best=list(SETS).index(USED))
+    return Table(heads, rows, marked=[list(SETS).index(USED)])
 
 
 def _drawn(fours: Mapping[Spec, Mapping[str, Four]]) -> Figure:

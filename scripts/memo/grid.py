@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...assets import memo
-from ..report.page import Figure, Table
+from ..report.markdown import Table
 from .counts import HEADS, TRIALS, Runs, counts, loss, most_trials, printed, why_chance, why_shape
 from .judge import Row, comparison_table, figure, figures, judge
-from .section import Comparison, Plan, Section
+from .section import Comparison, Figure, Plan, Section
 from .transforms import table4, table6
 from .trial import Batch, Spec, Stage, TrialCounts, batches, count_stages, gather, prepared
 

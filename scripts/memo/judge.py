@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..report.page import Table
+from ..report.markdown import Table
 from .section import Comparison
 
 FACTOR = 4.0

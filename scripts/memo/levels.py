@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...assets import memo
-from ..report.page import Block, Figure, Table
+from ..report.markdown import Table
 from .judge import COUNTS, Row, figures, four, judge
-from .section import Comparison, Plan, Section
+from .section import Comparison, Figure, Plan, Section
 from .trial import BATCH, Spec, prepared
 
 if TYPE_CHECKING:
@@ -238,7 +238,7 @@ def _table(
     return Table(table.heads, capped, marked=table.marked)
 
 
-def _drawn(name: str, titled: Mapping[str, Sequence[Row]]) -> Block:
+def _drawn(name: str, titled: Mapping[str, Sequence[Row]]) -> Figure:
     from .plots import draw_levels
 
     caption = (

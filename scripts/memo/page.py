@@ -4,95 +4,87 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from ..report.page import Block, Code, Figure, Heading, Items, Paragraph, Table, html, markdown
+from ..report.markdown import Table, code, figure, items
+from ..report.page import write_page
+from ..whole_file import write_whole
 from .judge import FACTOR
-from .section import Section
+from .section import Figure, Section
 
 TITLE = "AI Memo 738, rerun"
 STEM = "memo738"
 """What the page's files are called."""
 
-INTRODUCTION = (
-    "W. E. L. Grimson and T. Lozano-Pérez, “Model-Based Recognition and Localization from Sparse"
-    " Range or Tactile Data” (MIT AI Memo 738, 1983), asks how little has to be felt of a known"
-    " object to say where it is. palpate is built on its method. This page runs the memo's"
-    " experiments again and sets its printed figures beside ours."
-)
-METHOD: Sequence[tuple[str, str]] = (
-    (
-        "What is measured.",
-        "Contacts: points on the object's surface with the outward normals there. Each point is"
-        " known to within a bound (0.01 in, say) and each normal to within another (π/10, say: a"
-        " cone of 18° around the reading). Inside their bounds, errors are random; never beyond.",
-    ),
-    (
-        "Interpretations.",
-        "An interpretation says on which face of the object each contact lies. They form a tree:"
-        " the first contact on any face, for each of these the second on any, and so on.",
-    ),
-    (
-        "Local constraints.",
-        "Most of the tree is cut off by looking at pairs of contacts: two contacts can't be on two"
-        " faces whose points are never as far apart as they are (distance), whose normals make"
-        " another angle (angle), or where the one is never as far above the other (direction).",
-    ),
-    (
-        "Model test.",
-        "What is left is tested as a whole: is there one pose of the object (rotation and"
-        " translation) that puts every contact on its face? Interpretations that pass with about"
-        " the same pose count as one transform.",
-    ),
-    (
-        "What a good result is.",
-        "Few interpretations and few transforms, and the right ones always among them.",
-    ),
-)
-RULE = (
-    f"A row is “within” if our median is within a factor of {FACTOR:g} of the memo's, and if"
-    " along each axis of noise our medians never fall where the memo's rise, or rise where they"
-    " fall. Tables of other things than counts state their own rule. Rows outside the rule are"
-    " marked and explained; none is left out. Four figures in a cell are the least, the median,"
-    " the 90th percentile and the most of a row's trials."
-)
-STAND_INS = (
-    "The memo's objects are lost: it prints drawings, and their sizes and numbers of faces. Ours"
-    " are stand-ins with the same numbers of faces and the same diameters. The shapes of the"
-    " housing, the stapler, the complex hand and the planar wrench were chosen so that the medians"
-    " of Table II (Table I for the wrench) come out in the same order of magnitude; there an"
-    " agreement of medians is a fit. The simple hand, the 34-faced housing of Tables VII to IX and"
-    " the other planar objects weren't fitted, and no object was to any other table. The memo's"
-    " own figures were read from a transcript without page numbers, damaged in places, which is"
-    " said where it matters."
-)
+INTRODUCTION = f"""\
+# {TITLE}
+
+W. E. L. Grimson and T. Lozano-Pérez, “Model-Based Recognition and Localization from Sparse Range
+or Tactile Data” (MIT AI Memo 738, 1983), asks how little has to be felt of a known object to say
+where it is. palpate is built on its method. This page runs the memo's experiments again and sets
+its printed figures beside ours.
+
+## The method in five lines
+
+**What is measured.** Contacts: points on the object's surface with the outward normals there.
+Each point is known to within a bound (0.01 in, say) and each normal to within another (π/10, say:
+a cone of 18° around the reading). Inside their bounds, errors are random; never beyond.
+
+**Interpretations.** An interpretation says on which face of the object each contact lies. They
+form a tree: the first contact on any face, for each of these the second on any, and so on.
+
+**Local constraints.** Most of the tree is cut off by looking at pairs of contacts: two contacts
+can't be on two faces whose points are never as far apart as they are (distance), whose normals
+make another angle (angle), or where the one is never as far above the other (direction).
+
+**Model test.** What is left is tested as a whole: is there one pose of the object (rotation and
+translation) that puts every contact on its face? Interpretations that pass with about the same
+pose count as one transform.
+
+**What a good result is.** Few interpretations and few transforms, and the right ones always among
+them.
+
+## How figures are compared
+
+A row is “within” if our median is within a factor of {FACTOR:g} of the memo's, and if along each
+axis of noise our medians never fall where the memo's rise, or rise where they fall. Tables of
+other things than counts state their own rule. Rows outside the rule are marked and explained;
+none is left out. Four figures in a cell are the least, the median, the 90th percentile and the
+most of a row's trials.
+
+The memo's objects are lost: it prints drawings, and their sizes and numbers of faces. Ours are
+stand-ins with the same numbers of faces and the same diameters. The shapes of the housing, the
+stapler, the complex hand and the planar wrench were chosen so that the medians of Table II (Table
+I for the wrench) come out in the same order of magnitude; there an agreement of medians is a fit.
+The simple hand, the 34-faced housing of Tables VII to IX and the other planar objects weren't
+fitted, and no object was to any other table. The memo's own figures were read from a transcript
+without page numbers, damaged in places, which is said where it matters."""
 
 
-def page_blocks(sections: Sequence[Section], command: str, trials: int | None) -> list[Block]:
-    """All that the page shows, in order.
+def page(sections: Sequence[Section], command: str, trials: int | None) -> str:
+    """All that the page shows, as Markdown.
 
     Args:
         sections: what was run.
         command: how to do it again.
         trials: a row; None for as many as the memo ran.
     """
-    blocks: list[Block] = [Heading(TITLE, 1), Paragraph(INTRODUCTION)]
-    blocks += [Heading("The method in five lines")]
-    blocks += [Paragraph(text, lead) for lead, text in METHOD]
-    blocks += [Heading("How figures are compared"), Paragraph(RULE), Paragraph(STAND_INS)]
+    blocks = [INTRODUCTION]
     if trials is not None:
-        text = f"{trials} trials a row were run here, where the memo ran 100 (Table I: 250)."
-        blocks.append(Paragraph(text, "Trials."))
-    blocks += [Heading("At a glance"), Paragraph(verdict(sections)), _glance(sections)]
+        blocks.append(
+            f"**Trials.** {trials} trials a row were run here, where the memo ran 100 (Table I:"
+            " 250)."
+        )
+    blocks += ["## At a glance", verdict(sections), f"{_glance(sections)}"]
     for section in sections:
         blocks += _section(section)
-    return [*blocks, *_made(command)]
+    return "\n\n".join([*blocks, *_made(command)]) + "\n"
 
 
-def write_page(
+def write_sections(
     sections: Sequence[Section], command: str, folder: Path, trials: int | None = None
 ) -> Path:
     """Write the page as Markdown and as HTML, its drawings, and all figures as JSON.
@@ -106,24 +98,14 @@ def write_page(
     Returns:
         The files' path without ending.
     """
-    from ..whole_file import write_whole
-
     folder.mkdir(parents=True, exist_ok=True)
     stem = folder / STEM
-    blocks = page_blocks(sections, command, trials)
-    for block in blocks:
+    for block in (block for section in sections for block in section.blocks):
         if isinstance(block, Figure):
-            write_whole(folder / f"{STEM}-{block.name}.svg", block.svg.encode())
-    texts = {
-        "md": markdown(blocks, f"{STEM}-"),
-        "html": html(blocks, TITLE),
-        "json": json.dumps(
-            as_data(sections, command), indent=1, ensure_ascii=False, allow_nan=False
-        )
-        + "\n",
-    }
-    for ending, text in texts.items():
-        write_whole(stem.with_name(f"{STEM}.{ending}"), text.encode())
+            write_whole(folder / _file(block), block.svg.encode())
+    write_page(stem, page(sections, command, trials), TITLE)
+    data = json.dumps(as_data(sections, command), indent=1, ensure_ascii=False, allow_nan=False)
+    write_whole(stem.with_name(f"{STEM}.json"), f"{data}\n".encode())
     return stem
 
 
@@ -179,44 +161,44 @@ def _glance(sections: Sequence[Section]) -> Table:
     return Table(("experiment", "memo", *heads), rows)
 
 
-def _section(section: Section) -> list[Block]:
-    blocks: list[Block] = [
-        Heading(section.title),
-        Paragraph(f"Memo: {section.place}."),
-        Paragraph(section.asked, "Asked."),
-        Paragraph(section.done, "Done."),
-        Paragraph(section.found, "Found."),
-        *section.blocks,
-    ]
-    reasons = outside(section)
-    if reasons:
-        blocks += [Paragraph("", "Rows outside the rule:"), Items(reasons)]
-    reasons = sorted({row.why for row in section.comparisons if row.verdict == "not judged"})
-    if reasons:
-        blocks += [Paragraph("; ".join(reasons) + ".", "Not judged:")]
+def _section(section: Section) -> Iterator[str]:
+    yield f"## {section.title}"
+    yield f"Memo: {section.place}."
+    yield f"**Asked.** {section.asked}"
+    yield f"**Done.** {section.done}"
+    yield f"**Found.** {section.found}"
+    for block in section.blocks:
+        if isinstance(block, Figure):
+            yield figure(_file(block), block.caption)
+        else:
+            yield f"{block}"
+    if reasons := outside(section):
+        yield "**Rows outside the rule:**"
+        yield items(reasons)
+    if reasons := {row.why for row in section.comparisons if row.verdict == "not judged"}:
+        yield f"**Not judged:** {'; '.join(sorted(reasons))}."
     if section.checked:
-        blocks.append(
-            Paragraph(
-                f"The right interpretation was discarded in {section.lost:,} of"
-                f" {section.checked:,} trials."
-            )
+        yield (
+            f"The right interpretation was discarded in {section.lost:,} of {section.checked:,}"
+            " trials."
         )
-    return blocks
 
 
-def _made(command: str) -> list[Block]:
+def _file(drawing: Figure) -> str:
+    return f"{STEM}-{drawing.name}.svg"
+
+
+def _made(command: str) -> Iterator[str]:
     from ..benchmark.config import versions
 
     made_with = ", ".join(f"{name} {value}" for name, value in json.loads(versions()).items())
-    return [
-        Heading("How this page was made"),
-        Paragraph(
-            "One command runs everything and writes this page. The seed decides every case, so that"
-            " all but running times comes out the same on any number of processors."
-        ),
-        Code(command),
-        Paragraph(f"Made with {made_with}."),
-    ]
+    yield "## How this page was made"
+    yield (
+        "One command runs everything and writes this page. The seed decides every case, so that"
+        " all but running times comes out the same on any number of processors."
+    )
+    yield code(command)
+    yield f"Made with {made_with}."
 
 
 def _data(section: Section) -> dict[str, Any]:

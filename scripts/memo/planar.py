@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...assets import memo
-from ..report.page import Figure, Table
+from ..report.markdown import Table
 from .judge import FACTOR, figure, four
-from .section import Comparison, Plan, Section
+from .section import Comparison, Figure, Plan, Section
 from .trial import BATCH
 
 if TYPE_CHECKING:

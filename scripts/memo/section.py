@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol, TypeVar
 
-from ..report.page import Block
+from ..report.markdown import Table
 
 Case = TypeVar("Case")
 Result = TypeVar("Result")
@@ -29,6 +29,16 @@ class Comparison:
 
 
 @dataclass(frozen=True)
+class Figure:
+    """A drawing of a page."""
+
+    name: str
+    """Of its file, without what the page's files are called and without ending."""
+    svg: str
+    caption: str
+
+
+@dataclass(frozen=True)
 class Section:
     """An experiment: what was asked, what was done, what came out."""
 
@@ -40,8 +50,8 @@ class Section:
     asked: str
     done: str
     found: str
-    blocks: tuple[Block, ...]
-    """Tables and figures in the order in which they are read."""
+    blocks: tuple[str | Table | Figure, ...]
+    """Tables, figures and Markdown in the order in which they are read."""
     comparisons: tuple[Comparison, ...]
     checked: int
     """Trials in which it was looked whether the right interpretation was kept."""

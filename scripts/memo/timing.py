@@ -10,10 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...assets.memo import place, table2, timing
-from ..report.page import Figure, Paragraph, Table
+from ..report.markdown import Table
 from ..report.plots import COLOURS
 from .plots import in_style, svg_of
-from .section import Comparison, Plan, Section
+from .section import Comparison, Figure, Plan, Section
 from .timing_trials import COUNTED, KEPT, PRUNED, RECOGNIZED, TESTED, Trials, measure_times
 
 if TYPE_CHECKING:
@@ -114,7 +114,7 @@ def _section(
         ),
         blocks=(
             _table(here),
-            Paragraph(
+            (
                 "Means over the trials. Interpretations are those that the tree leaves and the"
                 " tests are run on."
             ),

@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from ...assets import memo
-from ..report.page import Figure
 from .coarse import memo_left
 from .counts import HEADS, REBUILT, Runs, counts, loss, printed, why_chance, why_shape
 from .groups import SHIFT_TOLERANCES_IN
 from .judge import Row, comparison_table, figure, figures, four, judge
-from .section import Section
+from .section import Figure, Section
 from .trial import Spec
 
 AGAIN = "Sensed as in Table II: 12 to 20 contacts from a grid of rays."

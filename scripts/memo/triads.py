@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...assets import memo
-from ..report.page import Block, Figure
 from .coarse import MemoLeft, memo_left
 from .counts import (
     HEADS,
@@ -23,7 +22,7 @@ from .counts import (
     why_shape,
 )
 from .judge import Four, Row, comparison_table, figure, figures, four, judge
-from .section import Plan, Section
+from .section import Figure, Plan, Section
 from .trial import Batch, Spec, Stage, TrialCounts, batches, count_stages, gather, prepared
 
 if TYPE_CHECKING:
@@ -235,7 +234,7 @@ def _why_test(memo_way: Mapping[tuple[str, ...], Four]) -> Callable[[Row], str]:
     return why
 
 
-def _drawn(name: str, rows: Sequence[Row], label: str) -> Block:
+def _drawn(name: str, rows: Sequence[Row], label: str) -> Figure:
     from .plots import draw_rows
 
     caption = f"Triad sensing, {label}: median, and a line from the least to the 90th percentile."

@@ -86,26 +86,23 @@ def draw_left(results: Sequence[SettingResult]) -> Figure:
     return _curves(results, lambda one: one.left, "hypotheses left", logarithmic=True)
 
 
-def save(figure: Figure, path: Path) -> str:
-    """Write a figure as SVG and PDF, and give the SVG's text.
+def save(figure: Figure, path: Path) -> None:
+    """Write a figure as SVG and PDF, and close it.
 
     Args:
-        figure: it is closed.
+        figure: what is drawn.
         path: without ending.
     """
     import matplotlib.pyplot as plt
 
     from ..whole_file import write_whole
 
-    drawn = {}
     with _style():
         for kind, stamp in (("svg", "Date"), ("pdf", "CreationDate")):
             sink = io.BytesIO()
             figure.savefig(sink, format=kind, metadata={stamp: None}, bbox_inches="tight")
-            drawn[kind] = sink.getvalue()
-            write_whole(path.with_name(f"{path.name}.{kind}"), drawn[kind])
+            write_whole(path.with_name(f"{path.name}.{kind}"), sink.getvalue())
     plt.close(figure)
-    return drawn["svg"].decode()
 
 
 def _curves(

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import json
-from collections import Counter
-from collections.abc import Sequence
-from textwrap import dedent
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
-from ...recognizer import PoseTolerance
 from ..benchmark.row import EpisodeRow
-from .page import Block, Code, Figure, Heading, Items, Paragraph, Table
+from .markdown import Table, items, literal
 from .results import BASELINES, PolicyResult, SettingResult
-from .statistics import DRAWS, PERMUTATIONS, Estimate, distinguishable_outcomes
+from .statistics import Estimate
 
 TITLE = "Where to touch next: strategies compared"
 HITS = "random-hit"
@@ -27,38 +23,36 @@ GOALS = {
 }
 
 
-def introduction(rows: Sequence[EpisodeRow]) -> list[Block]:
+def introduction(rows: Sequence[EpisodeRow]) -> Iterator[str]:
     """What was played, for someone who hasn't seen it."""
     one = rows[0]
-    return [
-        Heading(TITLE, 1),
-        Paragraph(
-            "An unknown object lies in an unknown pose on or across a plane. Each probe sends"
-            " rays down at it; every ray reports where it met the object and the direction of the"
-            " surface there, both within known bounds, or that it met the plane. After each probe a"
-            " recogniser lists every hypothesis (object and pose) that all contacts so far allow,"
-            " and a strategy chooses the next probe. An episode is solved when the recogniser knows"
-            f" {GOALS[one.goal]}; after {one.max_probes} probes it is given up."
-        ),
-        Paragraph(
-            "All strategies play the same episodes: the same object in the same pose, the same"
-            " first probe, the same noise. So they are compared episode by episode. Fewer probes"
-            f" are better; an episode that was given up counts as {one.max_probes + 1}."
-        ),
-        Items(
-            [
-                f"objects: {', '.join(_unique(row.objects for row in rows))}"
-                " (library: any of the objects that come with palpate, not known which);",
-                f"bounds on normals and positions: {', '.join(_unique(r.noise for r in rows))};",
-                f"sensor: {one.sensor}; placement: {one.placement}; first probe: the seed's;",
-                f"strategies: {', '.join(_unique(row.policy for row in rows))};",
-                f"episodes: seeds {min(r.seed for r in rows)} to {max(r.seed for r in rows)}.",
-            ]
-        ),
-    ]
+    yield f"# {TITLE}"
+    yield (
+        "An unknown object lies in an unknown pose on or across a plane. Each probe sends"
+        " rays down at it; every ray reports where it met the object and the direction of the"
+        " surface there, both within known bounds, or that it met the plane. After each probe a"
+        " recogniser lists every hypothesis (object and pose) that all contacts so far allow,"
+        " and a strategy chooses the next probe. An episode is solved when the recogniser knows"
+        f" {GOALS[one.goal]}; after {one.max_probes} probes it is given up."
+    )
+    yield (
+        "All strategies play the same episodes: the same object in the same pose, the same"
+        " first probe, the same noise. So they are compared episode by episode. Fewer probes"
+        f" are better; an episode that was given up counts as {one.max_probes + 1}."
+    )
+    yield items(
+        [
+            f"objects: {_listed(row.objects for row in rows)}"
+            " (library: any of the objects that come with palpate, not known which);",
+            f"bounds on normals and positions: {_listed(row.noise for row in rows)};",
+            f"sensor: {one.sensor}; placement: {one.placement}; first probe: the seed's;",
+            f"strategies: {_listed(row.policy for row in rows)};",
+            f"episodes: seeds {min(r.seed for r in rows)} to {max(r.seed for r in rows)}.",
+        ]
+    )
 
 
-def at_a_glance(results: Sequence[SettingResult]) -> list[Block]:
+def at_a_glance(results: Sequence[SettingResult]) -> Iterator[str]:
     """The best strategy of each setting."""
     baselines = [name for name in BASELINES if any(_named(r, name) for r in results)]
     heads = ["objects", "noise", "best strategy", "its probes", "floor"]
@@ -73,25 +67,24 @@ def at_a_glance(results: Sequence[SettingResult]) -> list[Block]:
             row.append(_shown(other.mean) if other else "")
             row.append(_percent(best.against[name].ratio) if name in best.against else "")
         rows.append(row)
-    return [
-        Heading("At a glance"),
-        Paragraph(
-            "The strategy with the fewest probes at the mean, with 95 % intervals, beside the"
-            " uninformed ones. It is the best of several on the same episodes, so its figures"
-            " flatter it a little."
-        ),
-        Table(heads, rows),
-        *_worse_than_hits(results),
-    ]
+    yield "## At a glance"
+    yield (
+        "The strategy with the fewest probes at the mean, with 95 % intervals, beside the"
+        " uninformed ones. It is the best of several on the same episodes, so its figures"
+        " flatter it a little."
+    )
+    yield str(Table(heads, rows))
+    yield from _worse_than_hits(results)
 
 
-def _worse_than_hits(results: Sequence[SettingResult]) -> list[Block]:
+def _worse_than_hits(results: Sequence[SettingResult]) -> Iterator[str]:
     """Which informed strategies a random probe that touches is better than; none without it."""
     if not any(_named(result, HITS) for result in results):
-        return []
+        return
     worse = [
-        f"{one.policy} on {result.objects}, {result.noise}: {_signed(one.against[HITS].difference)}"
-        f" probes, p {_p_value(one.against[HITS].p_value)}"
+        f"{literal(f'{one.policy} on {result.objects}, {result.noise}')}:"
+        f" {_signed(one.against[HITS].difference)} probes,"
+        f" p {_p_value(one.against[HITS].p_value)}"
         for result in results
         for one in result.policies
         if one.policy not in UNINFORMED
@@ -99,37 +92,29 @@ def _worse_than_hits(results: Sequence[SettingResult]) -> list[Block]:
         and one.against[HITS].p_value < SIGNIFICANT
     ]
     rule = f"paired permutation test, p below {SIGNIFICANT} after Holm's correction"
-    if not worse:
-        return [
-            Paragraph(
-                f"No informed strategy needs more probes than {HITS} in any setting ({rule})."
-            )
-        ]
-    return [
-        Paragraph(f"Informed strategies that need more probes than {HITS} ({rule}):"),
-        Items(worse),
-    ]
+    if worse:
+        yield f"Informed strategies that need more probes than {HITS} ({rule}):"
+        yield items(worse)
+    else:
+        yield f"No informed strategy needs more probes than {HITS} in any setting ({rule})."
 
 
-def setting_tables(result: SettingResult) -> list[Block]:
+def setting_tables(result: SettingResult) -> Iterator[str]:
     """All strategies of one setting: their figures, and beside the uninformed ones."""
-    best = result.policies.index(result.best)
+    best = [result.policies.index(result.best)]
     floor = "" if result.floor is None else f" Floor: {_floor(result)} probes."
     solvable = f"{100 * result.solvable.mean():.0f} % of them were solved by some strategy"
     heads = ["strategy", "solved", "probes, mean", "interquartile mean", "mean, if solvable"]
     heads += ["right answers", "ms to decide: median, 99 %"]
-    blocks: list[Block] = [
-        Heading(f"{result.objects}, {result.noise}", 3),
-        Paragraph(f"{result.episodes} episodes a strategy; {solvable}.{floor}"),
-        Table(heads, [_figures(one) for one in result.policies], best),
-    ]
+    yield f"### {literal(f'{result.objects}, {result.noise}')}"
+    yield f"{result.episodes} episodes a strategy; {solvable}.{floor}"
+    yield str(Table(heads, [_figures(one) for one in result.policies], best))
     baselines = [name for name in BASELINES if any(name in p.against for p in result.policies)]
     if baselines:
         heads = ["strategy"]
         for name in baselines:
             heads += [f"share of {name}'s", f"less {name}'s", "p"]
-        blocks.append(Table(heads, [_beside(one, baselines) for one in result.policies], best))
-    return blocks
+        yield str(Table(heads, [_beside(one, baselines) for one in result.policies], best))
 
 
 def _figures(one: PolicyResult) -> list[str]:
@@ -156,7 +141,7 @@ def _beside(one: PolicyResult, baselines: Sequence[str]) -> list[str]:
     return row
 
 
-def poses_table(results: Sequence[SettingResult]) -> list[Block]:
+def poses_table(results: Sequence[SettingResult]) -> Iterator[str]:
     """Poses left after 7 to 9 contacts."""
     policies = [one.policy for one in results[0].policies]
     rows = []
@@ -167,22 +152,20 @@ def poses_table(results: Sequence[SettingResult]) -> list[Block]:
             median, most, many = one.poses_left if one else (np.nan, 0, 0)
             row.append(f"{median:g} ({most}), {many}" if many else "")
         rows.append(row)
-    return [
-        Heading("Poses left after 7 to 9 contacts"),
-        Paragraph(
-            "Hypotheses left after the first probe that brought the contacts to at least seven:"
-            " median (most), episodes. One that was solved with fewer contacts counts as 1; one"
-            " that was given up with fewer isn't counted. The memo (Section 4.4) has a median of 5"
-            " and at most 14 poses on its housing at pi/8, 0.05 in, with random probes."
-        ),
-        Table(["strategy", *(f"{r.objects}, {r.noise}" for r in results)], rows),
-    ]
+    yield "## Poses left after 7 to 9 contacts"
+    yield (
+        "Hypotheses left after the first probe that brought the contacts to at least seven:"
+        " median (most), episodes. One that was solved with fewer contacts counts as 1; one"
+        " that was given up with fewer isn't counted. The memo (Section 4.4) has a median of 5"
+        " and at most 14 poses on its housing at pi/8, 0.05 in, with random probes."
+    )
+    yield str(Table(["strategy", *(f"{r.objects}, {r.noise}" for r in results)], rows))
 
 
-def decision_table(rows: Sequence[EpisodeRow]) -> list[Block]:
+def decision_table(rows: Sequence[EpisodeRow]) -> Iterator[str]:
     """How long strategies think, over all settings."""
     shown = []
-    for policy in _unique(row.policy for row in rows):
+    for policy in dict.fromkeys(row.policy for row in rows):
         own = [row for row in rows if row.policy == policy]
         spent = 1e3 * np.array([s for row in own for s in row.decision_processor_seconds])
         clock = 1e3 * np.array([s for row in own for s in row.decision_seconds])
@@ -196,105 +179,22 @@ def decision_table(rows: Sequence[EpisodeRow]) -> list[Block]:
             [policy, f"{len(spent)}", *(_milliseconds(f) for f in figures), str(max(rivals))]
         )
     heads = ["strategy", "decisions", "median", "99 %", "most", "clock, median", "clock, 99 %"]
-    return [
-        Heading("Time to decide"),
-        Paragraph(
-            "Milliseconds of one processor core for one decision, over all settings; beside them"
-            " those of the clock, which other work on the machine lengthens. What a process does"
-            " once, such as loading compiled code, is left out."
-        ),
-        Table([*heads, "most hypotheses"], shown),
-    ]
-
-
-def method(rows: Sequence[EpisodeRow]) -> list[Block]:
-    """What the figures are."""
-    outcomes = {
-        (row.objects, row.noise): distinguishable_outcomes(
-            row.diameter, row.position_error, row.normal_error
-        )
-        for row in rows
-    }
-    least, most = min(outcomes.values()), max(outcomes.values())
-    return [
-        Heading("What the figures are"),
-        Items(
-            [
-                "Probes to unique: probes sent, the first included, until the episode was solved;"
-                f" {rows[0].max_probes + 1} if it wasn't. The interquartile mean is that of the"
-                " middle half.",
-                "Mean, if solvable: over the episodes that some strategy solved. The others may"
-                " have no solution: where what would tell two poses apart lies out of reach, below"
-                " the plane, no probe can.",
-                "Solved, right answers: shares with Wilson's 95 % score interval. An answer is"
-                " right if it names the true object and, where the pose is asked for, its pose is"
-                f" within the pose tolerance ({_tolerance()}) of the true one, up to the object's"
-                " symmetries; the recogniser gives one only if all poses within the bounds are. An"
-                " episode in which nothing fits any more has ended with a wrong one.",
-                f"Intervals of means: percentile bootstrap, {DRAWS} resamples, drawn within strata"
-                " (setting and true object); of ratios and differences, episodes are resampled in"
-                " pairs.",
-                f"p: paired sign-flip permutation test of the mean difference, {PERMUTATIONS}"
-                " permutations, both sides, with Holm's correction over the strategies of a"
-                " setting.",
-                "Floor: the first probe, and ceil(log_B K) further ones, at least one unless the"
-                " first solved it; mean over episodes. K is the number of hypotheses after the"
-                " first probe. B is a bound on the outcomes of a probe that can be told apart for"
-                " sure: each ray misses, or meets the object at one of D/e + 1 depths (D the"
-                " diameter of the largest object, e the bound on positions: readings more than 2e"
-                " apart, over a length of 2D) with one of (1 + sin a)/(1 - cos a) normals (a the"
-                " bound on normals: cones that don't overlap), and there are three rays. Here B is"
-                f" {least:.2g} to {most:.2g}. No strategy can be sure to end sooner; the bound is"
-                " far from tight, as no object shows a probe that many outcomes.",
-            ]
-        ),
-    ]
-
-
-def reproduction(settings: dict[str, object], rows: Sequence[EpisodeRow]) -> list[Block]:
-    """How to get the same page again."""
-    versions = Counter(row.versions for row in rows)
-    played = [
-        ", ".join(f"{name} {number}" for name, number in json.loads(text).items())
-        + (f" ({count} episodes)" if len(versions) > 1 else "")
-        for text, count in versions.items()
-    ]
-    folder = str(settings["command"]).rsplit("--out ", 1)[-1]
-    return [
-        Heading("How to get it again"),
-        Code(f"{settings['command']}\npalpate report {folder}"),
-        Paragraph(
-            dedent("""\
-            The same rows come out, however many processes play them and however often it is
-            stopped in between; only the decision times are measured anew.""").replace("\n", " ")
-        ),
-        Items([f"played with {text}" for text in played]),
-    ]
-
-
-def _tolerance() -> str:
-    tolerance = PoseTolerance()
-    return (
-        f"{np.degrees(tolerance.rotation):g}°, for the centroid {100 * tolerance.translation:g} %"
-        f" of the diameter or {tolerance.position_errors:g} bounds on positions, whichever is more"
+    yield "## Time to decide"
+    yield (
+        "Milliseconds of one processor core for one decision, over all settings; beside them"
+        " those of the clock, which other work on the machine lengthens. What a process does"
+        " once, such as loading compiled code, is left out."
     )
-
-
-def figures(drawn: Sequence[tuple[str, str, str]]) -> list[Block]:
-    """Drawings under one heading.
-
-    Args:
-        drawn: name, SVG and caption of each.
-    """
-    return [Figure(name, svg, caption) for name, svg, caption in drawn]
+    yield str(Table([*heads, "most hypotheses"], shown))
 
 
 def _named(result: SettingResult, policy: str) -> PolicyResult | None:
     return next((one for one in result.policies if one.policy == policy), None)
 
 
-def _unique(values: Sequence[str] | object) -> list[str]:
-    return list(dict.fromkeys(values))  # pyright: ignore[reportArgumentType, reportCallIssue]
+def _listed(names: Iterable[str]) -> str:
+    """Each once, in the order in which they come."""
+    return literal(", ".join(dict.fromkeys(names)))
 
 
 def _shown(one: Estimate) -> str:

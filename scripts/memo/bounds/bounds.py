@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from ...report.page import Figure, Items, Paragraph, Table
-from ..section import Comparison, Plan, Section
+from ...report.markdown import Table, items
+from ..section import Comparison, Figure, Plan, Section
 from .counts import COUNTERS, LEVELS, NOISE, SHAPES, Counts, Shape, Trials, count_nodes, make_shape
 from .plots import draw_nodes
 
@@ -94,14 +94,14 @@ def _section(nodes: Mapping[str, Floats], counts: Sequence[Counts], trials: int)
                 " below what was counted is no bound.",
             ),
             _table(nodes),
-            Paragraph(
+            (
                 f"Means over the trials. {BROKEN} marks a formula that the tree, pruned by all"
                 f" distances, is above; {BROKEN_CHAIN} one that only the chain is above that its"
                 f" proof is about; both by more than {SURE:g} standard errors. Mended is the"
                 " corollary of Proposition 3 with the exponent that its own proof gives, (k+1)/2"
                 " for (k-1)/2. The sphere has 320 faces; its trees were counted to level 3."
             ),
-            Items(_reasons()),
+            items(_reasons()),
         ),
         comparisons=compared,
         checked=trials * len(SHAPES),

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ....assets.memo import PoseErrorRow, place, table5
-from ...report.page import Figure, Items, Paragraph, Table
-from ..section import Comparison, Plan, Section
+from ...report.markdown import Table, items
+from ..section import Comparison, Figure, Plan, Section
 from .judge import COLUMNS, FACTOR, NAMES, SURE, TRIALS, given, judge, label, means, printed
 from .plots import draw_means, draw_singularity
 from .trials import METHODS, TRANSLATION, WHOLE, Errors, Trials, measure_errors
@@ -57,7 +57,7 @@ def _section(rows: Sequence[PoseErrorRow], errors: Sequence[Errors], trials: int
         found=_found(compared, errors),
         blocks=(
             _table(rows, errors, compared),
-            Paragraph(
+            (
                 "Mean errors. A row is within if each mean by the memo's method is within a factor"
                 f" of {FACTOR:g} of the printed one, and no mean is ordered the other way against"
                 " the next row of less noise; means count as ordered if they are more than"
@@ -67,14 +67,14 @@ def _section(rows: Sequence[PoseErrorRow], errors: Sequence[Errors], trials: int
                 " direction and angle differ between rows of one bound on normals, that is the"
                 " scatter of a mean of 100."
             ),
-            *([Items(outside)] if outside else []),
+            *([items(outside)] if outside else []),
             Figure(
                 "pose-errors",
                 draw_means(rows, errors),
                 "Mean errors by row, with 95 % intervals, on logarithmic scales.",
             ),
             _rotation_table(rows, errors),
-            Paragraph(
+            (
                 "The same poses by the angle of the one rotation that leads from the computed pose"
                 " to the true one. It is the better measure, since it needs no direction: an object"
                 " that is hardly turned has hardly a direction of rotation, and the error of that"

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from ....assets.memo import RangeRow, place, range_setting, range_views
 from ....envs.sensors.range_image import RangeView
-from ...report.page import Figure, Paragraph, Table
-from ..section import Comparison, Plan, Section
+from ...report.markdown import Table
+from ..section import Comparison, Figure, Plan, Section
 from .picture import FoundPose, PictureRow, draw_views
 from .trials import (
     ELEVATION,
@@ -95,7 +95,7 @@ def _section(views: Sequence[RangeRow], outcomes: Sequence[Outcome], seed: int) 
         found=_found(views, outcomes),
         blocks=(
             _table(views, outcomes),
-            Paragraph(
+            (
                 "Least / median / 90th percentile / most over the placements; the memo has one"
                 " image each. A row is within if the median with the readings as read is within a"
                 f" factor of {FACTOR:g} of the memo's figure."

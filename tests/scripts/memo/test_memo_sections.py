@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from helpers.shown_page import Shown
 from oracles import solids as oracles
 from scipy.spatial.transform import RigidTransform, Rotation
 
@@ -20,7 +21,6 @@ from palpate.assets.memo import PoseErrorRow, range_views, table5, timing
 from palpate.envs.probe_env import INCH
 from palpate.recognizer import Contacts
 from palpate.recognizer.tree.tree import Pruned
-from palpate.scripts.commands.report.page import Figure, Table, html, markdown
 from palpate.scripts.memo import timing as memo_timing
 from palpate.scripts.memo import timing_trials as memo_timing_trials
 from palpate.scripts.memo.bounds import bounds as memo_bounds
@@ -37,10 +37,11 @@ from palpate.scripts.memo.errors import errors as memo_errors
 from palpate.scripts.memo.errors import trials as memo_errors_trials
 from palpate.scripts.memo.errors.judge import judge, neighbours
 from palpate.scripts.memo.errors.trials import METHODS, Errors, pose_errors
+from palpate.scripts.memo.page import write_sections
 from palpate.scripts.memo.range import range as memo_range
 from palpate.scripts.memo.range import trials as memo_range_trials
 from palpate.scripts.memo.range.trials import generator, interpret, memo_noise, readings, take_view
-from palpate.scripts.memo.section import Experiment, Section
+from palpate.scripts.memo.section import Experiment, Figure, Section
 
 EXPERIMENTS: dict[str, Experiment] = {
     "table5": memo_errors.run,
@@ -87,16 +88,21 @@ def test_no_trial_loses_the_right_interpretation_and_every_trial_is_counted(name
 
 
 @every_experiment
-def test_a_section_says_what_it_is_about_and_makes_a_page(name):
+def test_a_section_says_what_it_is_about_and_makes_a_page(name, tmp_path):
     found, _ = section(name)
     assert found.name == name
     assert found.place.startswith("Section")
     for text in (found.title, found.asked, found.done, found.found):
         assert text
         assert "nan" not in text
-    page = html(found.blocks, found.title)
-    assert page.count("<figure>") == len(figures(found)) >= 1
-    assert "nan" not in markdown([block for block in found.blocks if isinstance(block, Table)], "")
+    stem = write_sections([found], "palpate reproduce", tmp_path)
+    shown = Shown(stem.with_suffix(".html").read_text(encoding="utf-8"))
+    assert len(shown.drawings) == len(figures(found)) >= 1
+    for text in (found.title, found.asked, found.done, found.found):
+        assert text in shown.text
+    for figure in figures(found):
+        assert figure.caption in shown.text
+    assert not [cell for line in shown.lines for cell in line if "nan" in cell]
 
 
 @every_experiment
