@@ -6,11 +6,10 @@ import os
 import re
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
+from helpers.checkout import ROOT
 
-ROOT = Path(__file__).resolve().parent.parent
 TEXT = (ROOT / "docs" / "recipes.md").read_text(encoding="utf-8")
 RECIPES = {
     section.split("\n")[0]: re.findall(r"```python\n(.*?)```", section, re.DOTALL)

@@ -1,50 +1,30 @@
-"""The planar environment: Gymnasium's contract, rays against exact fractions, the truth kept."""
+"""The planar environment: Gymnasium's contract, and the truth kept."""
 
 from __future__ import annotations
 
 import inspect
 import pickle
-from fractions import Fraction
 from itertools import pairwise
 
 import gymnasium
-import matplotlib.path
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
-from oracles import outlines as planar_oracles
-from scipy.spatial.transform import RigidTransform, Rotation
+from helpers.episodes import digest, play
+from oracles.outlines import OUTLINES
+from scipy.spatial.transform import Rotation
 
 import palpate.envs
-from palpate.envs.pictures import view as picture_view
-from palpate.envs.pictures import window
 from palpate.envs.planar import planar_env
 from palpate.envs.planar.library import load_outlines
-from palpate.envs.planar.picture import PlanarPicture, draw_planar
 from palpate.envs.planar.planar_env import PlanarProbeEnv
-from palpate.envs.planar.probe import PlanarProbe
 from palpate.envs.planar.rays import cast_planar_rays
 from palpate.envs.scene.scene import NOTHING, OBJECT
-from palpate.envs.sensors.noise import SensorNoise
 from palpate.recognizer import Polygon
 
 gymnasium.register_envs(palpate.envs)
 
 ID = "palpate/ProbePlanar-v0"
-OUTLINES = [*planar_oracles.OUTLINES, "wrench", "gator", "hand"]
-
-
-def outline(name: str) -> Polygon:
-    return planar_oracles.entry(name).model
-
-
-def random_pose(rng: np.random.Generator, extent: float) -> RigidTransform:
-    rotation = Rotation.from_rotvec([0.0, 0.0, rng.uniform(-np.pi, np.pi)])
-    return RigidTransform.from_components([*rng.uniform(-extent, extent, 2), 0.0], rotation)
-
-
-def unit(bearings) -> np.ndarray:
-    return np.column_stack([np.cos(bearings), np.sin(bearings)])
 
 
 @pytest.fixture(scope="module")
@@ -52,156 +32,13 @@ def env() -> PlanarProbeEnv:
     return PlanarProbeEnv(max_probes=30)
 
 
-def play(env, seed, probes=30):
-    """Observations of a random episode, and what the last step told."""
-    rng = np.random.default_rng(seed)
-    observation, info = env.reset(seed=seed)
-    trace, ended = [observation], False
-    for _ in range(probes):
-        observation, _, terminated, truncated, info = env.step(rng.uniform(-1, 1, 2))
-        trace.append(observation)
-        ended = terminated
-        if terminated or truncated:
-            break
-    return trace, ended, info
-
-
-def digest(env, seed):
-    """All bytes of an episode's observations and of its truth."""
-    trace, _, info = play(env, seed)
-    parts = [value.tobytes() for observation in trace for value in observation.values()]
-    return b"".join(parts) + info["truth"]["pose"].tobytes()
-
-
-# --- Rays --------------------------------------------------------------------------------------
-
-
-def first_edge_by_fractions(corners, origin, direction):
-    """The depth and the edge where a ray first meets an outline, in exact arithmetic."""
-    (ox, oy), (dx, dy) = ([Fraction(float(x)) for x in row] for row in (origin, direction))
-    exact = [[Fraction(float(x)) for x in corner] for corner in corners]
-    best, edge = None, -1
-    for k, (px, py) in enumerate(exact):
-        qx, qy = exact[(k + 1) % len(exact)]
-        ex, ey = qx - px, qy - py
-        scale = dx * ey - dy * ex
-        if scale == 0:
-            continue
-        depth = ((px - ox) * ey - (py - oy) * ex) / scale
-        share = ((px - ox) * dy - (py - oy) * dx) / scale
-        if depth >= 0 and 0 <= share <= 1 and (best is None or depth < best):
-            best, edge = depth, k
-    return (np.inf if best is None else float(best)), edge
-
-
-@pytest.mark.parametrize("name", ["triangle", "l-shape", "comb", "wrench", "hand"])
-def test_rays_meet_the_edges_that_exact_fractions_find(name):
-    rng, model = np.random.default_rng(0), outline(name)
-    middle, size = model.centroid, model.diameter
-    origins = middle + 1.5 * size * unit(rng.uniform(-np.pi, np.pi, 40))
-    towards = middle + 0.4 * size * rng.normal(size=(40, 2)) - origins
-    directions = towards / np.linalg.norm(towards, axis=1, keepdims=True)
-    hits = cast_planar_rays(model, RigidTransform.identity(), origins, directions)
-    met = 0
-    for ray in range(len(origins)):
-        depth, edge = first_edge_by_fractions(model.corners, origins[ray], directions[ray])
-        assert hits.edges[ray] == edge
-        assert hits.distances[ray] == pytest.approx(depth, rel=1e-12)
-        met += edge >= 0
-    assert 10 < met < 40
-
-
-@pytest.mark.parametrize("name", OUTLINES)
-def test_a_ray_is_outside_before_it_meets_an_outline_and_inside_after(name):
-    rng, model = np.random.default_rng(1), outline(name)
-    size = model.diameter
-    pose = random_pose(rng, size)
-    bearings = rng.uniform(-np.pi, np.pi, 200)
-    middle = pose.apply(np.append(model.centroid, 0.0))[:2]
-    starts = middle - 2.0 * size * unit(bearings)
-    starts += rng.uniform(-0.4, 0.4, (200, 1)) * size * unit(bearings + np.pi / 2.0)
-    hits = cast_planar_rays(model, pose, starts, unit(bearings))
-    ring = pose.apply(np.column_stack([model.corners, np.zeros(model.face_count)]))[:, :2]
-    solid = matplotlib.path.Path(np.concatenate([ring, ring[:1]]), closed=True)
-    free = np.where(hits.hit, hits.distances, 4.0 * size)
-    for share in np.linspace(0.0, 1.0 - 1e-9, 40):
-        assert not solid.contains_points(starts + (share * free)[:, None] * unit(bearings)).any()
-    met = hits.hit
-    beyond = (hits.points_world + 1e-9 * size * unit(bearings))[met]
-    # A ray that only clips a corner is out again by then; it would be a rare one.
-    assert solid.contains_points(beyond).mean() > 0.99
-    assert met.sum() > 50
-    assert np.isnan(hits.points_world[~met]).all()
-    assert np.isnan(hits.normals_world[~met]).all()
-    facing = (hits.normals_world * unit(bearings))[met].sum(axis=1)
-    assert (facing < 0.0).all()
-    normals = model.normals[hits.edges[met]] @ pose.rotation.as_matrix()[:2, :2].T
-    assert np.allclose(hits.normals_world[met], normals)
-
-
-@pytest.mark.parametrize("name", ["triangle", "square", "hexagon", "70-gon"])
-def test_no_ray_slips_through_a_corner(name):
-    rng, model = np.random.default_rng(2), outline(name)
-    for _ in range(50):
-        pose = random_pose(rng, 2.0)
-        ring = pose.apply(np.column_stack([model.corners, np.zeros(model.face_count)]))[:, :2]
-        middle = pose.apply(np.append(model.centroid, 0.0))[:2]
-        directions = (middle - ring) / np.linalg.norm(middle - ring, axis=1, keepdims=True)
-        hits = cast_planar_rays(model, pose, ring - directions, directions)
-        assert np.allclose(hits.distances, 1.0)
-
-
-# --- The probe ---------------------------------------------------------------------------------
-
-
-def test_what_the_probe_reports_is_within_its_bounds_and_fills_them():
-    rng, model = np.random.default_rng(3), outline("gator")
-    noise = SensorNoise(position_error=1e-3, normal_error=0.3)
-    probe, far, lean = PlanarProbe(noise, 2.0 * model.diameter), [], []
-    for _ in range(3000):
-        pose = random_pose(rng, 0.1 * model.diameter)
-        bearing, offset = rng.uniform(-np.pi, np.pi), rng.uniform(-0.3, 0.3) * model.diameter
-        touch = probe.touch(model, pose, bearing, offset, rng)
-        start, direction = touch.start_world, unit([bearing])
-        assert np.linalg.norm(start) == pytest.approx(np.hypot(probe.reach, offset))
-        hits = cast_planar_rays(model, pose, start[None], direction)
-        assert (touch.outcome == OBJECT) == hits.hit[0] == (len(touch.contacts) == 1)
-        if touch.outcome == NOTHING:
-            assert np.allclose(touch.end_world, start + 2.0 * probe.reach * direction[0])
-            continue
-        assert np.allclose(touch.contacts.approaches, direction, atol=1e-15)
-        assert np.array_equal(touch.end_world, touch.contacts.positions[0])
-        far.append(np.linalg.norm(touch.end_world - hits.points_world[0]))
-        one, other = touch.contacts.normals[0], hits.normals_world[0]
-        lean.append(np.arctan2(one[0] * other[1] - one[1] * other[0], one @ other))
-    assert max(far) <= 1e-3
-    assert np.mean(np.array(far) < 0.5e-3) == pytest.approx(0.25, abs=0.04)
-    assert np.abs(lean).max() <= 0.3
-    assert np.mean(np.array(lean) < 0.15) == pytest.approx(0.75, abs=0.04)
-
-
-def test_offsets_are_to_the_left_of_the_ray():
-    probe = PlanarProbe(SensorNoise(position_error=1e-3, normal_error=0.1), 5.0)
-    square = outline("square")
-    pose = RigidTransform.identity()
-    above = probe.touch(square, pose, 0.0, 0.9, np.random.default_rng(0))
-    assert above.start_world == pytest.approx([-5.0, 0.9])
-    assert above.outcome == OBJECT
-    below = probe.touch(square, pose, np.pi, 0.9, np.random.default_rng(0))
-    assert below.start_world == pytest.approx([5.0, -0.9])
-    assert below.outcome == NOTHING
-
-
-# --- The environment ---------------------------------------------------------------------------
-
-
 def test_the_environment_keeps_gymnasiums_contract():
-    # Mode "human" opens a window, which a test can't; its own tests are below.
+    # Mode "human" opens a window, which a test can't; see `test_planar_picture`.
     check_env(gymnasium.make(ID, max_probes=6).unwrapped, skip_render_check=True)
 
 
 def test_the_environment_is_made_by_its_name_and_takes_outlines():
-    square = Polygon.from_corners(planar_oracles.OUTLINES["l-shape"], name="mine")
+    square = Polygon.from_corners(OUTLINES["l-shape"], name="mine")
     made = gymnasium.make(ID, library=[square], position_error=0.02, max_probes=2)
     observation, info = made.reset(seed=0)
     assert made.observation_space.contains(observation)
@@ -210,7 +47,7 @@ def test_the_environment_is_made_by_its_name_and_takes_outlines():
 
 def test_every_observation_lies_in_its_space_and_shares_no_memory(env):
     for seed in range(5):
-        trace, _, _ = play(env, seed)
+        trace, _ = play(env, seed)
         for observation in trace:
             assert env.observation_space.contains(observation)
         for first, second in pairwise(trace):
@@ -281,7 +118,7 @@ def test_the_truth_is_never_lost(position_error, normal_error):
 def test_small_and_large_outlines_are_probed_alike(scale):
     """In their own units all episodes are the same."""
     shapes = [
-        Polygon.from_corners(scale * np.array(planar_oracles.OUTLINES[name], float), name=name)
+        Polygon.from_corners(scale * np.array(OUTLINES[name], float), name=name)
         for name in ("triangle", "l-shape")
     ]
     env = PlanarProbeEnv(shapes, position_error=0.01 * scale, max_probes=8)
@@ -326,7 +163,7 @@ def test_an_episode_ends_with_its_last_probe_and_may_be_stepped_on():
 
 
 def test_the_observation_shows_what_the_belief_holds(env):
-    trace, _, _ = play(env, 7, probes=3)
+    trace, _ = play(env, 7, probes=3)
     observation, belief = trace[-1], env.belief
     assert observation["hypothesis_count"][0] == len(belief.hypotheses) > 1
     assert observation["interpretation_count"][0] == belief.interpretations
@@ -389,12 +226,6 @@ def test_a_wrong_argument_is_named(arguments, words):
         PlanarProbeEnv(**arguments)
 
 
-def test_noise_that_is_not_uniform_is_refused():
-    gaussian = SensorNoise(position_error=1e-3, normal_error=0.1, distribution="gaussian")
-    with pytest.raises(ValueError, match="uniform, not 'gaussian'"):
-        PlanarProbe(gaussian, 1.0)
-
-
 def test_the_docstring_names_the_defaults_that_hold():
     documented = PlanarProbeEnv.__doc__ or ""
     for name, parameter in inspect.signature(PlanarProbeEnv).parameters.items():
@@ -407,96 +238,3 @@ def test_the_docstring_names_the_defaults_that_hold():
     assert planar_env.PLACED == 1 / 5
     assert "a fifth of the half width" in documented
     assert [outline.name for outline in load_outlines()] == ["wrench", "gator", "hand"]
-
-
-# --- Pictures ----------------------------------------------------------------------------------
-
-
-def test_a_picture_shows_each_thing_where_it_is():
-    square = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
-    image = draw_planar(
-        PlanarPicture(
-            outline_world=square,
-            rays_world=np.array([[[-9.0, 0.0], [-1.0, 0.0]], [[-9.0, 1.8], [9.0, 1.8]]]),
-            ray_hits=np.array([True, False]),
-            contacts_world=np.array([[-1.0, 0.0]]),
-            normals_world=np.array([[-1.0, 0.0]]),
-            ghosts=(),
-            half_width=2.0,
-            title="",
-        ),
-        size=400,
-    )
-    assert image.shape == (400, 400, 3)
-    assert image.dtype == np.uint8
-
-    def colour_at(x, y):
-        # The axes fill 0.96 x 0.90 of the picture from 0.02; the world is square in their middle.
-        side = 0.90 * 400 / (2.0 * 2.0 * 1.1)
-        return image[round(400 - (0.47 * 400 + y * side)), round(200 + x * side)] / 255.0
-
-    assert colour_at(0.5, 0.5) == pytest.approx(picture_view.OBJECT, abs=0.02)
-    assert colour_at(-1.0, 0.0) == pytest.approx(picture_view.CONTACT, abs=0.05)
-    assert colour_at(-1.6, 0.0) == pytest.approx(picture_view.RAY_HIT, abs=0.4)
-    assert colour_at(0.0, 1.8) == pytest.approx(picture_view.RAY_MISSED, abs=0.3)
-    assert colour_at(1.5, 1.5) == pytest.approx([1.0, 1.0, 1.0])
-
-
-def test_rendering_follows_the_episode_and_is_the_same_to_the_bit():
-    env, other = (PlanarProbeEnv(render_mode="rgb_array") for _ in range(2))
-    frames = []
-    for each in (env, other):
-        each.reset(seed=1)
-        frames.append([each.render()])
-        for action in ([0.2, 0.0], [0.7, 0.1]):
-            each.step(np.array(action))
-            frames[-1].append(each.render())
-    assert all(np.array_equal(a, b) for a, b in zip(*frames, strict=True))
-    assert len({frame.tobytes() for frame in frames[0]}) == 3
-    assert frames[0][0].shape == (600, 600, 3)
-    assert PlanarProbeEnv().render() is None
-
-
-def test_a_window_where_none_can_open_is_refused_with_a_word_on_what_would_do(monkeypatch):
-    monkeypatch.setattr(window, "toolkit_name", lambda: None)
-    with pytest.raises(gymnasium.error.DependencyNotInstalled, match="rgb_array"):
-        gymnasium.make(ID, render_mode="human")
-
-
-def test_matplotlibs_picture_backend_opens_no_windows():
-    import matplotlib.pyplot as plt
-
-    plt.switch_backend("agg")
-    assert window.toolkit_name() is None
-
-
-def test_a_window_shows_each_step_until_it_is_closed(monkeypatch):
-    """On a toolkit that only counts: matplotlib's figures are real, opening them isn't."""
-    import matplotlib.pyplot as plt
-    from matplotlib.figure import Figure
-
-    plt.switch_backend("agg")
-    opened = []
-    monkeypatch.setattr(window, "toolkit_name", lambda: "counting")
-    monkeypatch.setattr(Figure, "show", lambda figure: opened.append(figure))
-    env = gymnasium.make(ID, render_mode="human").unwrapped
-    assert isinstance(env, PlanarProbeEnv)
-    env.reset(seed=0)
-    env.step(np.array([0.3, 0.0]))
-    assert env.render() is None
-    (figure,) = opened
-    shown = np.asarray(figure.axes[0].images[0].get_array())
-    env.render_mode = "rgb_array"
-    drawn = env.render()
-    assert drawn is not None
-    assert np.array_equal(shown, drawn)
-    env.render_mode = "human"
-    plt.close(figure)
-    env.step(np.array([0.3, 0.0]))
-    assert len(opened) == 2
-    copy = pickle.loads(pickle.dumps(env))
-    copy.step(np.array([0.3, 0.0]))
-    copy.close()
-    env.close()
-    env.close()
-    assert not plt.get_fignums()

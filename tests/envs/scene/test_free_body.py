@@ -23,7 +23,9 @@ def small_motion(rng: np.random.Generator, size: float) -> RigidTransform:
     )
 
 
-def felt(model, pose: RigidTransform, rng: np.random.Generator, count: int = 20) -> Contacts:
+def felt_at_bounds(
+    model, pose: RigidTransform, rng: np.random.Generator, count: int = 20
+) -> Contacts:
     """Contacts that are off by next to all that their bounds allow."""
     points, faces = oracles.surface_points(model, count, rng)
     off = rng.normal(size=(count, 3))
@@ -85,7 +87,7 @@ def test_contacts_hold_for_the_moved_object_once_they_are_grown(name):
         before = oracles.random_pose(rng, model.diameter)
         after = small_motion(rng, model.diameter) * before
         seed = int(rng.integers(1 << 30))
-        contacts = felt(model, before, np.random.default_rng(seed))
+        contacts = felt_at_bounds(model, before, np.random.default_rng(seed))
         points, faces = oracles.surface_points(model, 20, np.random.default_rng(seed))
         wider = grown(contacts, displacement(model, before, after))
         off = np.linalg.norm(wider.positions - after.apply(points), axis=1)

@@ -9,6 +9,7 @@ import mujoco
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
+from helpers.episodes import CUT_SHORT
 from oracles.solids import box, model
 from oracles.touch_truth import faults
 from scipy.spatial.transform import RigidTransform, Rotation
@@ -26,19 +27,18 @@ from palpate.envs.sensors.finger_sensor import FingerSensor
 from palpate.envs.sensors.noise import SensorNoise
 from palpate.envs.sensors.ray_sensor import RaySensor
 from palpate.envs.sensors.touch import ProbeCommand, Touch
-from palpate.recognizer import Polyhedron, SearchLimits
+from palpate.recognizer import Polyhedron
 from palpate.recognizer.models.features import all_features
 
 gymnasium.register_envs(palpate.envs)
 
 NOISE = SensorNoise(position_error=2.5e-4, normal_error=0.1)
-CUT_SHORT = SearchLimits(budget=1, nodes=100)
 PUSH = 2.0
 """Newtons; enough to move all of the stand-ins where a side is pushed."""
 
 
-def block(size: float = 0.04) -> Polyhedron:
-    return Polyhedron.from_mesh(box(size, size, 0.5 * size), name="block")
+def slab(size: float = 0.04) -> Polyhedron:
+    return Polyhedron.from_mesh(box(size, size, 0.5 * size), name="slab")
 
 
 def standing(solid: Polyhedron, free: FreeObject | None = None, seed: int = 0) -> ProbeScene:
@@ -77,13 +77,13 @@ def test_an_object_at_rest_stays_where_it_was_placed(name):
 @pytest.mark.parametrize("size", [1e-3, 0.04, 10.0 / np.sqrt(2.25)])
 @pytest.mark.parametrize("density", [600.0, 8000.0])
 def test_small_and_large_light_and_heavy_objects_stand(size, density):
-    solid = block(size)
+    solid = slab(size)
     scene = standing(solid, FreeObject(mass=density * 0.5 * size**3))
     assert scene.stands(SINK)
 
 
 def test_too_light_an_object_is_refused_and_the_mass_that_will_do_is_told():
-    solid = block(1e-3)
+    solid = slab(1e-3)
     with pytest.raises(ValueError, match=r"give at least 1\.94e-07 kg") as told:
         ProbeScene(solid, free=FreeObject(mass=1e-8))
     least = float(str(told.value).split()[-2])
@@ -91,7 +91,7 @@ def test_too_light_an_object_is_refused_and_the_mass_that_will_do_is_told():
 
 
 def test_an_object_that_is_let_go_over_an_edge_falls_on_a_face():
-    solid = block()
+    solid = slab()
     scene = ProbeScene(solid, free=FreeObject())
     tilted = Rotation.from_euler("x", np.radians(40.0))
     lift = -float(tilted.apply(solid.vertices)[:, 2].min())
@@ -105,7 +105,7 @@ def test_an_object_that_is_let_go_over_an_edge_falls_on_a_face():
 @pytest.mark.parametrize("mass", [0.02, 1.0])
 def test_what_slides_comes_to_rest_where_coulomb_says(friction, mass):
     """From 0.3 m/s a body slides v² / (2 µ g) far, whatever its mass."""
-    scene = standing(block(), FreeObject(mass=mass, friction=friction))
+    scene = standing(slab(), FreeObject(mass=mass, friction=friction))
     before = scene.T_world_object
     scene.mj_data.qvel[0] = 0.3
     scene.settle()
@@ -117,12 +117,12 @@ def test_what_slides_comes_to_rest_where_coulomb_says(friction, mass):
 
 
 def test_the_simulated_body_has_the_mass_that_was_asked_for():
-    scene = standing(block(), FreeObject(mass=0.3))
+    scene = standing(slab(), FreeObject(mass=0.3))
     body = scene.mj_model.body("object").id
     assert scene.mj_model.body_mass[body] == pytest.approx(0.3)
     inertia = 0.3 * (0.04**2 + np.array([0.02, 0.02, 0.04]) ** 2) / 12.0
     assert np.sort(scene.mj_model.body_inertia[body]) == pytest.approx(np.sort(inertia))
-    by_volume = standing(block()).mj_model.body_mass[body]
+    by_volume = standing(slab()).mj_model.body_mass[body]
     assert by_volume == pytest.approx(1000.0 * 0.04 * 0.04 * 0.02)
 
 
@@ -284,15 +284,21 @@ def test_the_truth_is_kept_while_the_object_is_pushed_about():
         use_free_space=True,
         max_probes=5,
     )
+    whole, pushed = 0, 0.0
     for seed in range(3):
         env.reset(seed=seed)
         rng, ended = np.random.default_rng(seed), False
         while not ended:
-            *_, terminated, truncated, _ = env.step(rng.uniform(-1.0, 1.0, 3))
+            *_, terminated, truncated, info = env.step(rng.uniform(-1.0, 1.0, 3))
             ended = terminated or truncated
+            pushed = max(pushed, info["displacement"]["distance"])
+            # A search that a limit cuts short may miss the truth.
             if env.belief is not None and env.belief.complete:
                 names = {hypothesis.object_name for hypothesis in env.belief.hypotheses}
                 assert env.true_object.name in names
+                whole += 1
+    assert whole >= 5
+    assert pushed > 1e-3
 
 
 @pytest.mark.parametrize(

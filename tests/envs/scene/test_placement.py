@@ -23,16 +23,6 @@ from palpate.recognizer.contacts.support import StableFace, stable_faces
 SOLIDS = ("cube", "tetrahedron", "l-block", "holed", "bridge", "hull-20")
 
 
-def mesh_of(model: Polyhedron) -> trimesh.Trimesh:
-    return trimesh.Trimesh(model.vertices, model.triangles, process=False)
-
-
-def scaled(name: str, diameter: float) -> Polyhedron:
-    model = oracles.model(name)
-    mesh = trimesh.Trimesh(diameter / model.diameter * model.vertices, model.triangles)
-    return Polyhedron.from_mesh(mesh, name=f"{name} of {diameter:g} m")
-
-
 @cache
 def faces_of(model: Polyhedron) -> list[StableFace]:
     return stable_faces(model)
@@ -53,7 +43,7 @@ def assert_stands(model: Polyhedron, pose: RigidTransform, support: SupportPlane
     face = faces_of(model)[face_below(model, pose)]
     assert np.abs(pose.apply(face.corners)[:, 2]).max() <= support.error
     # And the centre of mass is above that face.
-    foot = pose.apply(mesh_of(model).center_mass)[:2]
+    foot = pose.apply(oracles.mesh_of(model).center_mass)[:2]
     outline = pose.apply(face.corners)[:, :2]
     assert in_outline(outline, foot, 2e-6 * model.diameter)
 
@@ -99,7 +89,7 @@ def test_the_shares_are_those_of_an_independent_computation(name):
     resting = resting_faces(model)
     assert resting.shares.sum() == pytest.approx(1.0, abs=1e-12)
     assert len(resting.faces) == len(stable_faces(model))
-    poses, shares = mesh_of(model).compute_stable_poses(sigma=0, n_samples=1, threshold=0)
+    poses, shares = oracles.mesh_of(model).compute_stable_poses(sigma=0, n_samples=1, threshold=0)
     expected = np.zeros(len(resting.faces))
     for pose, share in zip(poses, shares, strict=True):
         alike = [face.normal @ -pose[2, :3] for face in resting.faces]
@@ -258,8 +248,8 @@ def test_a_brick_falls_on_its_broad_sides_more_often_than_on_its_ends():
 
 @pytest.mark.parametrize("diameter", [1e-3, 0.1, 10.0])
 def test_size_makes_no_difference_to_a_drop(diameter):
-    model = scaled("l-block", diameter)
-    like = scaled("l-block", 0.25)
+    model = oracles.scaled("l-block", diameter)
+    like = oracles.scaled("l-block", 0.25)
     one, other = (
         DropScene(m, worked_out_parts(m).parts).drop(np.random.default_rng(9))
         for m in (model, like)
@@ -350,7 +340,7 @@ def test_an_object_that_never_rests_is_said(monkeypatch):
 def test_mass_centre_and_inertia_are_those_of_an_independent_computation(name):
     model = oracles.model(name)
     found = mass_properties(model, 2700.0)
-    mesh = mesh_of(model)
+    mesh = oracles.mesh_of(model)
     mesh.density = 2700.0
     assert found.mass == pytest.approx(mesh.mass, rel=1e-9)
     assert volume(model) == pytest.approx(mesh.volume, rel=1e-9)
@@ -369,7 +359,7 @@ def test_the_inertia_of_a_box_is_the_textbooks():
 
 
 def test_the_simulated_body_has_the_mass_of_the_surface_and_not_of_overlapping_parts():
-    model = scaled("housing", 0.1)
+    model = oracles.scaled("housing", 0.1)
     scene = DropScene(model, worked_out_parts(model).parts)
     expected = mass_properties(model, 1000.0)
     assert scene._compiled.body_mass[1] == pytest.approx(expected.mass, rel=1e-9)

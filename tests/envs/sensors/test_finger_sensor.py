@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 import numpy as np
 import pytest
 import trimesh
+from helpers.collision_parts import parts_of
+from helpers.digests import bytes_of
 from oracles.checker import cone_of
 from oracles.geometry import cone_angles, signed_distances
 from oracles.solids import blocks, box, hull_of, model
 from oracles.touch_truth import faults, touches_around
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from palpate.assets import STAND_IN_NAMES, ConvexPart
-from palpate.envs.collision.collision import CollisionParts
+from palpate.assets import STAND_IN_NAMES
 from palpate.envs.scene.finger import Finger, FingerDesign
 from palpate.envs.scene.placement import AcrossPlane
 from palpate.envs.scene.scene import NOTHING, OBJECT, PLANE, ProbeScene
@@ -37,11 +40,6 @@ def make_finger(
 ) -> tuple[FingerSensor, ProbeScene]:
     solid = model(name)
     return FingerSensor(noise, 2.0 * solid.diameter, **options), ProbeScene(solid)
-
-
-def parts_of(*meshes: trimesh.Trimesh) -> CollisionParts:
-    parts = (ConvexPart(np.array(m.vertices), np.array(m.faces, np.int64)) for m in meshes)
-    return CollisionParts(tuple(parts), 0.0)
 
 
 def prism_of(outline: list[list[float]]) -> trimesh.Trimesh:
@@ -105,7 +103,7 @@ def test_what_it_reports_is_true_within_the_bounds_it_states(noise, threshold):
 def test_slow_and_fast_fingers_touch_the_same(speed):
     usual, scene = make_finger("housing")
     sensor = FingerSensor(USUAL, usual.reach, speed=speed)
-    rng = np.random.default_rng(2)
+    rng, met = np.random.default_rng(2), 0
     for _ in range(4):
         scene.place(AcrossPlane(offset=0.01).draw(rng, scene.model))
         x, y = rng.uniform(-0.02, 0.02, 2)
@@ -115,6 +113,8 @@ def test_slow_and_fast_fingers_touch_the_same(speed):
         for one, other in both:
             assert one.outcome == other.outcome
             assert np.linalg.norm(one.position_world - other.position_world) < 2.0 * stated
+            met += one.outcome == OBJECT
+    assert met > 3
 
 
 def test_the_way_through_the_air_is_as_if_it_were_simulated(monkeypatch):
@@ -231,6 +231,7 @@ def test_a_contact_too_shallow_for_a_normal_is_none_yet():
     sensor, scene = make_finger("housing")
     scene.mount(DESIGN)
     finger, rng = Finger(scene.mj_model, scene.mj_data), np.random.default_rng(12)
+    felt: Counter[float] = Counter()
     for _ in range(5):
         scene.place(AcrossPlane(offset=0.01).draw(rng, scene.model))
         (start, *_), (direction, *_) = triad(0.0, 0.0, 0.3, sensor.reach)
@@ -244,6 +245,9 @@ def test_a_contact_too_shallow_for_a_normal_is_none_yet():
             finger.step(tip)
             for contact in finger.contacts():
                 assert np.linalg.norm(contact.normal_world - met.normal_world) < 1e-3
+                felt[beyond] += 1
+    assert felt[1e-8] == 5
+    assert felt[0.0] < 5
 
 
 @pytest.mark.parametrize("speed", [0.02, 0.1])
@@ -283,23 +287,17 @@ def test_a_finger_that_misses_reports_the_plane():
 
 
 def test_the_same_seed_gives_the_same_touch_to_the_bit_whatever_was_touched_before():
-    def digest(scene: ProbeScene) -> bytes:
-        touches = touches_around(sensor, scene, np.random.default_rng(8), 4)
-        return b"".join(
-            t.contacts.positions.tobytes()
-            + t.contacts.normals.tobytes()
-            + b"".join(force.tobytes() for force in t.forces)
-            for t in touches
-        )
+    def touches(scene: ProbeScene) -> bytes:
+        return bytes_of(list(touches_around(sensor, scene, np.random.default_rng(8), 4)))
 
     sensor, scene = make_finger("simple-hand", force_threshold=0.5)
-    fresh = digest(scene)
-    assert digest(scene) == fresh
+    fresh = touches(scene)
+    assert touches(scene) == fresh
     FingerSensor(USUAL, 0.4, speed=0.1).touch(
         scene, ProbeCommand(0.01, 0.0, 0.0), np.random.default_rng(9)
     )
-    assert digest(scene) == fresh
-    assert digest(ProbeScene(scene.model)) == fresh
+    assert touches(scene) == fresh
+    assert touches(ProbeScene(scene.model)) == fresh
 
 
 @pytest.mark.parametrize("radius", [0.0005, 0.01])

@@ -6,17 +6,16 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
+from helpers.episodes import CUT_SHORT
 
 import palpate.envs
 from palpate.envs.probe_env import ProbeEnv
 from palpate.envs.scene.scene import OBJECT
 from palpate.envs.sensors.noise import SensorNoise
 from palpate.envs.sensors.ray_sensor import RaySensor
-from palpate.recognizer import EDGE, FACE, VERTEX, SearchLimits, pose_difference
+from palpate.recognizer import EDGE, FACE, VERTEX, pose_difference
 
 gymnasium.register_envs(palpate.envs)
-
-CUT_SHORT = SearchLimits(budget=1, nodes=100)
 
 
 def test_the_last_number_of_an_action_chooses_the_sensor():

@@ -51,7 +51,7 @@ def test_what_it_reports_is_true_within_the_bounds_it_states(name, distribution,
 
 def test_contacts_say_from_where_they_were_touched():
     scene, rng = ProbeScene(model("stapler")), np.random.default_rng(1)
-    sensor = RaySensor(USUAL, 0.4)
+    sensor, met = RaySensor(USUAL, 0.4), 0
     for touch in touches_around(sensor, scene, rng, 20):
         hit = touch.outcomes == OBJECT
         ways = touch.ends_world - touch.starts_world
@@ -59,6 +59,8 @@ def test_contacts_say_from_where_they_were_touched():
         # A reported end is off the ray by the noise, 0.25 mm over 0.2 m and more.
         assert np.allclose(touch.contacts.approaches, ways[hit], atol=2e-3)
         assert np.array_equal(touch.contacts.positions, touch.ends_world[hit])
+        met += int(hit.sum())
+    assert met > 10
 
 
 def test_a_row_that_is_missed_in_the_middle_leaves_the_others_in_order():
@@ -132,7 +134,7 @@ def test_an_object_far_from_its_own_origin_is_as_exact():
     mesh = box(0.06, 0.05, 0.04)
     mesh.apply_translation([300.0, -200.0, 100.0])
     solid = Polyhedron.from_mesh(mesh, name="far")
-    scene, rng = ProbeScene(solid), np.random.default_rng(9)
+    scene, rng, seen = ProbeScene(solid), np.random.default_rng(9), 0
     for _ in range(20):
         scene.place(AcrossPlane(offset=0.01).draw(rng, solid))
         starts, directions = triad(0.0, 0.0, rng.uniform(-1, 1), 0.3)
@@ -141,6 +143,8 @@ def test_an_object_far_from_its_own_origin_is_as_exact():
         met = readings.outcomes == OBJECT
         apart = readings.ends_world[met] - hits.points_world[met]
         assert np.abs(apart).max(initial=0.0) < scene.position_rounding + 1e-9
+        seen += int(met.sum())
+    assert seen > 10
 
 
 def test_narrow_triangles_do_not_bend_normals():
@@ -182,7 +186,7 @@ def test_narrow_triangles_do_not_bend_normals():
 )
 def test_rounding_is_no_more_than_is_stated(name):
     solid = model(name)
-    scene, rng = ProbeScene(solid), np.random.default_rng(10)
+    scene, rng, seen = ProbeScene(solid), np.random.default_rng(10), 0
     for _ in range(10):
         scene.place(AcrossPlane(offset=0.01).draw(rng, solid))
         x, y = rng.uniform(-0.02, 0.02, 2)
@@ -194,6 +198,8 @@ def test_rounding_is_no_more_than_is_stated(name):
         assert np.abs(heights.sum(axis=1)).max(initial=0.0) < scene.position_rounding
         lean = angles(readings.normals_world[met], hits.normals_world[met])
         assert lean.max(initial=0.0) < NORMAL_ROUNDING
+        seen += int(met.sum())
+    assert seen > 5
 
 
 @pytest.mark.parametrize("command", [(np.nan, 0.0, 0.0), (0.0, np.inf, 0.0), (0.0, 0.0, -np.inf)])
