@@ -5,11 +5,10 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
+from helpers.checkout import ROOT
 
-ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"```(\w*)\n(.*?)```", README, re.DOTALL)
 
@@ -44,7 +43,11 @@ def test_the_environment_is_made_as_the_readme_says():
 
 def test_every_target_and_file_that_the_readme_names_exists():
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
-    for target in set(re.findall(r"make (\w+)", README)) - {"lists"}:
+    targets = set(re.findall(r"make (\w+)", README)) - {"lists"}
+    paths = re.findall(r"\((docs/[\w.]+)\)|`((?:envs|assets|recognizer)/[\w./]+)`", README)
+    assert targets
+    assert paths
+    for target in targets:
         assert f"\n{target}:" in makefile, target
-    for path in re.findall(r"\((docs/[\w.]+)\)|`((?:envs|assets|recognizer)/[\w./]+)`", README):
+    for path in paths:
         assert (ROOT / (path[0] or path[1])).exists(), path

@@ -17,7 +17,7 @@ from palpate.assets import mesh_path
 from palpate.recognizer import Polyhedron, pose_difference
 
 
-def palpate(*arguments: str, cwd: Path, **variables: str) -> subprocess.CompletedProcess[str]:
+def run_apart(*arguments: str, cwd: Path, **variables: str) -> subprocess.CompletedProcess[str]:
     program = "from palpate.scripts.cli import main; main()"
     return subprocess.run(
         [sys.executable, "-c", program, *arguments],
@@ -30,7 +30,7 @@ def palpate(*arguments: str, cwd: Path, **variables: str) -> subprocess.Complete
 
 
 def test_an_episode_as_json_holds_the_truth_among_its_hypotheses(tmp_path):
-    told = palpate("episode", "--object", "simple-hand", "--json", "--no-picture", cwd=tmp_path)
+    told = run_apart("episode", "--object", "simple-hand", "--json", "--no-picture", cwd=tmp_path)
     assert told.returncode == 0, told.stderr
     document = json.loads(told.stdout)
     assert document["truth"]["object"] == "simple-hand"
@@ -58,11 +58,11 @@ def test_an_episode_tells_its_story_and_draws_it(tmp_path):
 def test_an_episode_is_filmed(tmp_path):
     options = ("--object", "simple-hand", "--max-probes", "1", "--no-picture")
     # Fewer pictures are drawn without GL.
-    told = palpate("episode", *options, "--video", "a.mp4", cwd=tmp_path, MUJOCO_GL="disable")
+    told = run_apart("episode", *options, "--video", "a.mp4", cwd=tmp_path, MUJOCO_GL="disable")
     assert told.returncode == 0, told.stderr
     assert told.stderr == ""
     assert "video: a.mp4, " in told.stdout
-    assert "drawn by matplotlib" in told.stdout
+    assert "drawn by NumPy" in told.stdout
     assert [path.name for path in tmp_path.iterdir()] == ["a.mp4"]
     assert (tmp_path / "a.mp4").read_bytes()[4:8] == b"ftyp"
 

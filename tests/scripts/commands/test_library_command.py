@@ -13,22 +13,22 @@ from palpate.recognizer import Polyhedron, Recognizer
 from palpate.recognizer.advice.twins import near_twins, sample_surface, surface_distances
 
 
-def block(step: float) -> trimesh.Trimesh:
+def stepped_block(step: float) -> trimesh.Trimesh:
     """Of 60 by 40 by 20 mm, with a step cut out of one corner."""
     filled = [[[1], [1]], [[1], [0]]]
     return blocks(filled, [0, 0.06 - step, 0.06], [0, 0.04 - step, 0.04], [0, 0.02])
 
 
-def solid(mesh: trimesh.Trimesh, name: str) -> Polyhedron:
+def polyhedron_of(mesh: trimesh.Trimesh, name: str) -> Polyhedron:
     return Polyhedron.from_mesh(mesh, name=name)
 
 
 @pytest.fixture(scope="module")
 def twins():
     library = [
-        solid(box(0.06, 0.04, 0.02), "whole"),
-        solid(block(0.004), "stepped"),
-        solid(box(0.03, 0.03, 0.03), "cube"),
+        polyhedron_of(box(0.06, 0.04, 0.02), "whole"),
+        polyhedron_of(stepped_block(0.004), "stepped"),
+        polyhedron_of(box(0.03, 0.03, 0.03), "cube"),
     ]
     found = near_twins(
         Recognizer(library),

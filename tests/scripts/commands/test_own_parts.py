@@ -5,19 +5,18 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.checkout import ROOT
 from helpers.command import run_here
 
-ROOT = Path(__file__).resolve().parent.parent
 TEXT = (ROOT / "docs" / "own-parts.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"^```(\w*)\n(.*?)^```$", TEXT, re.DOTALL | re.MULTILINE)
 NUMBER = r"-?\d+(?:\.\d+)?"
 
 
-def same(printed: str, promised: str) -> bool:
+def same_text(printed: str, promised: str) -> bool:
     """The same words, and the same numbers but for rounding."""
     words, told = (re.sub(rf"\s*{NUMBER}|\s+", " #", text).split() for text in (printed, promised))
     found, said = (np.array(re.findall(NUMBER, text), float) for text in (printed, promised))
@@ -54,7 +53,7 @@ def walked(tmp_path_factory) -> list[tuple[str, str, str]]:
 def test_every_command_and_program_prints_what_the_page_says(walked):
     assert len(walked) == 8
     for line, printed, promised in walked:
-        assert same(printed, promised), f"{line}:\n{printed}"
+        assert same_text(printed, promised), f"{line}:\n{printed}"
 
 
 def test_eight_touches_end_in_one_pose(walked):
@@ -66,7 +65,7 @@ def test_eight_touches_end_in_one_pose(walked):
 
 
 def test_other_numbers_and_other_words_would_be_noticed():
-    assert same("It is housing  1.00 -2.5", "It is housing 1.01  -2.5")
-    assert not same("It is housing 1.00", "It is housing 1.10")
-    assert not same("It is housing 1.00", "It is stapler 1.00")
-    assert not same("It is housing", "It is housing 1.00")
+    assert same_text("It is housing  1.00 -2.5", "It is housing 1.01  -2.5")
+    assert not same_text("It is housing 1.00", "It is housing 1.10")
+    assert not same_text("It is housing 1.00", "It is stapler 1.00")
+    assert not same_text("It is housing", "It is housing 1.00")

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import json
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
 from helpers.command import Told, run_here
-from oracles.solids import box, first_hit, model, random_hull, surface_points
+from helpers.forbidding import forbid
+from helpers.processes import loaded_by
+from oracles.solids import box, first_hit, mesh_of, model, random_hull, surface_points
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from palpate.policies.ranking import FORMULAS
@@ -29,9 +29,8 @@ POSE = RigidTransform.from_components(
 HEADER = "x,y,z,nx,ny,nz"
 
 
-def mesh_of(name: str, scale: float = SIZE) -> trimesh.Trimesh:
-    solid = model(name)
-    return trimesh.Trimesh(scale * solid.vertices, solid.triangles, process=False)
+def millimetres(name: str, scale: float = SIZE) -> trimesh.Trimesh:
+    return mesh_of(model(name), scale)
 
 
 @pytest.fixture(scope="module")
@@ -40,13 +39,13 @@ def folder(tmp_path_factory) -> Path:
     path = tmp_path_factory.mktemp("own")
     (path / "parts").mkdir()
     for name in NAMES:
-        mesh_of(name).export(path / "parts" / f"{name}.stl")
+        millimetres(name).export(path / "parts" / f"{name}.stl")
     for count in (9, 3):
-        write(path / f"felt{count}.csv", felt()[:count])
+        write(path / f"felt{count}.csv", touch_table()[:count])
     return path
 
 
-def felt() -> np.ndarray:
+def touch_table() -> np.ndarray:
     """(9, 6) touches of the l-block at `POSE`, one on each face and one more: mm, and normals."""
     rng, solid = np.random.default_rng(0), model("l-block")
     points, faces = surface_points(solid, 200, rng)
@@ -84,7 +83,7 @@ def test_the_document_is_in_the_units_of_the_files_and_agrees_with_rays(folder):
     """Of nine touches one pose is left: what is predicted is what a ray cast at the truth meets."""
     document = suggested(folder, "felt9.csv")
     assert (document["verdict"], document["units"]) == ("unique", "mm")
-    triangles = 1e3 * POSE.apply(1e-3 * mesh_of("l-block").vertices)[model("l-block").triangles]
+    triangles = 1e3 * POSE.apply(1e-3 * millimetres("l-block").vertices)[model("l-block").triangles]
     assert len(document["suggestions"]) == 3
     for one in document["suggestions"]:
         start, direction = np.array(one["start"]), np.array(one["direction"])
@@ -237,7 +236,7 @@ def test_windows_line_ends_semicolons_and_decimal_commas_are_taken(folder, tmp_p
 def test_a_mistake_in_all_of_a_file_is_recognised_and_said(
     folder, tmp_path, command, change, words
 ):
-    write(tmp_path / "felt.csv", change(felt()))
+    write(tmp_path / "felt.csv", change(touch_table()))
     told = run_here(command, "felt.csv", "--library", str(folder / "parts"), cwd=tmp_path)
     assert told.code == 0
     assert "Not in this library" in told.out
@@ -248,7 +247,7 @@ def test_a_mistake_in_all_of_a_file_is_recognised_and_said(
 @pytest.mark.parametrize("scale", [25.4, 1 / 25.4])
 def test_a_part_of_the_wrong_size_is_said(folder, tmp_path, scale):
     shutil.copytree(folder / "parts", tmp_path / "parts")
-    mesh_of("l-block", scale * SIZE).export(tmp_path / "parts" / "l-block.stl")
+    millimetres("l-block", scale * SIZE).export(tmp_path / "parts" / "l-block.stl")
     told = run_here("recognize", str(folder / "felt9.csv"), "--library", "parts", cwd=tmp_path)
     size = "too small" if scale > 1 else "too large"
     assert f"25.4 times {size}: they are in" in told.out
@@ -257,7 +256,7 @@ def test_a_part_of_the_wrong_size_is_said(folder, tmp_path, scale):
 
 def test_a_mesh_with_holes_is_named_with_how_to_mend_it(folder, tmp_path):
     shutil.copytree(folder / "parts", tmp_path / "parts")
-    whole = mesh_of("holed")
+    whole = millimetres("holed")
     leaky = trimesh.Trimesh(whole.vertices, whole.faces[2:], process=False)
     leaky.export(tmp_path / "parts" / "holed.stl")
     for command in ("recognize", "suggest"):
@@ -271,7 +270,7 @@ def test_a_mesh_with_holes_is_named_with_how_to_mend_it(folder, tmp_path):
 
 def test_two_files_of_one_part_are_said_to_be_that(folder, tmp_path):
     shutil.copytree(folder / "parts", tmp_path / "parts")
-    again = mesh_of("l-block")
+    again = millimetres("l-block")
     again.apply_transform(trimesh.transformations.rotation_matrix(1.0, [1, 2, 3], [4, 5, 6]))
     again.export(tmp_path / "parts" / "copy.stl")
     for command in ("recognize", "suggest"):
@@ -309,7 +308,7 @@ def skew_box(hand: int) -> trimesh.Trimesh:
 
 
 def test_a_file_without_normals_is_warned_of(folder, tmp_path):
-    write(tmp_path / "bare.csv", felt()[:1, :3], "x,y,z")
+    write(tmp_path / "bare.csv", touch_table()[:1, :3], "x,y,z")
     told = run_here("recognize", "bare.csv", "--library", str(folder / "parts"), cwd=tmp_path)
     assert told.code == 0
     assert "bare.csv: no normals in it (nx,ny,nz), so this takes more touches" in told.err
@@ -327,24 +326,18 @@ def test_twenty_parts_are_weighed_and_their_tables_built_once(folder, tmp_path, 
     assert first.code == 0, first.err
     assert "9 contacts, 20 parts" in first.out
 
-    def built_again(*_: object) -> None:
-        raise AssertionError("tables are kept on disk")
-
-    monkeypatch.setattr(PairTables, "of", built_again)
+    forbid(monkeypatch, PairTables, "of")
     assert run_here(*command, cwd=tmp_path) == first
 
 
 def test_suggest_loads_no_simulator():
-    program = (
-        "import sys, palpate.policies.session\n"
-        "assert not {'mujoco', 'gymnasium', 'matplotlib', 'av'} & set(sys.modules)\n"
-    )
-    subprocess.run([sys.executable, "-c", program], check=True)
+    heavy = {"mujoco", "gymnasium", "matplotlib", "av"}
+    assert not heavy & loaded_by("import palpate.policies.session")
 
 
 def test_a_finding_about_one_contact_tells_which():
-    table = felt()
+    table = touch_table()
     table[2, :3] += 15.0
     contacts = Contacts(1e-3 * table[:, :3], table[:, 3:], position_error=1e-4, normal_error=0.2)
-    part = Polyhedron.from_mesh(mesh_of("l-block"), name="l-block", scale=1e-3)
+    part = Polyhedron.from_mesh(millimetres("l-block"), name="l-block", scale=1e-3)
     assert [one.contact for one in diagnose(Recognizer([part]), contacts)] == [2]

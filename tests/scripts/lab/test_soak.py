@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 import typer
+from helpers.processes import HEAVY, loaded_by
 
 from palpate.envs.planar.planar_env import PlanarProbeEnv
 from palpate.envs.probe_env import ProbeEnv
@@ -53,12 +52,7 @@ def say(env, touch) -> None:
 
 
 def test_the_commands_help_loads_nothing_heavy():
-    run = (
-        "import sys, palpate.scripts.lab.soak\n"
-        "heavy = {'numpy', 'scipy', 'mujoco', 'numba', 'trimesh', 'gymnasium'}\n"
-        "assert not heavy & set(sys.modules)\n"
-    )
-    assert subprocess.run([sys.executable, "-c", run], check=False, timeout=60).returncode == 0
+    assert not HEAVY & loaded_by("import palpate.scripts.lab.soak")
 
 
 @pytest.mark.parametrize("name", MAIN)
