@@ -41,12 +41,8 @@ class Renderer:
     def __init__(self) -> None:
         self._untried = _gl_environments()
         self._process: _GlProcess | None = None
-        self._name = "MuJoCo"
-
-    @property
-    def name(self) -> str:
+        self.name = "MuJoCo"
         """Who painted last: "MuJoCo" or "NumPy"."""
-        return self._name
 
     def draw(self, scene: PictureScene, stage: Stage, size: Size) -> NDArray[np.uint8]:
         """The picture without captions, ``(height, width, 3)``; ``size`` is (width, height)."""
@@ -57,7 +53,7 @@ class Renderer:
                 return self._process.draw(scene, stage, size)
             except (OSError, EOFError):
                 self._end_process()
-        self._name = "NumPy"
+        self.name = "NumPy"
         return paint(scene, stage, size)
 
     def close(self) -> None:
