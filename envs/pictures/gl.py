@@ -110,7 +110,7 @@ def _compile(scene: PictureScene, view: look.View, width: int, height: int) -> m
     )
     spec.worldbody.add_light(
         type=mujoco.mjtLightType.mjLIGHT_DIRECTIONAL,
-        dir=-view.towards_light,
+        dir=(-view.towards_light).tolist(),
         diffuse=[0.40, 0.40, 0.40],
         specular=[0.05, 0.05, 0.05],
         castshadow=False,
