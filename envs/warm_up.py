@@ -1,7 +1,4 @@
-"""Compile the sensors' kernels once, so that the first touch doesn't wait.
-
-Run as `python -m palpate.envs.warm_up`.
-"""
+"""Compile the sensors' kernels once, so that the first touch doesn't wait."""
 
 from __future__ import annotations
 
@@ -16,5 +13,5 @@ def warm_up() -> None:
     noise.blur(np.random.default_rng(0), np.ones(1, np.int8), np.zeros((1, 3)), np.eye(3)[:1])
 
 
-if __name__ == "__main__":
-    warm_up()
+PARTS = (warm_up,)
+"""What can be compiled independently of all else."""

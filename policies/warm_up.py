@@ -1,7 +1,4 @@
-"""Compile the strategies' kernels once, so that the first real choice doesn't wait.
-
-Run as `python -m palpate.policies.warm_up`.
-"""
+"""Compile the strategies' kernels once, so that the first real choice doesn't wait."""
 
 from __future__ import annotations
 
@@ -35,5 +32,5 @@ def warm_up() -> None:
     assert outcomes.left.shape == outcomes.distances.shape
 
 
-if __name__ == "__main__":
-    warm_up()
+PARTS = (warm_up,)
+"""What can be compiled independently of all else."""

@@ -1,9 +1,4 @@
-"""Compile every kernel once, so that the first real call doesn't wait.
-
-Run as `python -m palpate.recognizer.warm_up`.
-
-numba keeps the compiled code beside the source, or in the user's cache where that is read-only.
-"""
+"""Calls every kernel once, so that it is compiled; see `preparing`."""
 
 from __future__ import annotations
 
@@ -15,7 +10,7 @@ from .contacts.free_space import FreeSpace
 from .contacts.support import SupportPlane
 from .models.polygon import Polygon
 from .models.polyhedron import Polyhedron
-from .models.rays import cast_rays
+from .models.rays import RayHits, cast_rays
 from .poses.surroundings.repair import repair
 from .poses.surroundings.surroundings import Surroundings, bounds_of
 from .predict.pose_samples import sample_belief
@@ -25,41 +20,65 @@ from .recognize import Recognizer
 from .tree.tree import Constraints, prune
 
 
-def warm_up() -> None:
-    """Run the recogniser and the predictor once on a box, the recogniser on a rectangle too."""
-    import trimesh
-
-    box = Polyhedron.from_mesh(trimesh.creation.box((1.0, 2.0, 3.0)), name="box")
-    hits = cast_rays(box, RigidTransform.identity(), 5.0 * np.eye(3), -np.eye(3))
-    contacts = Contacts(
-        hits.points_world, hits.normals_world, position_error=0.01, normal_error=0.1
-    )
-    recognizer = Recognizer([box])
+def recognize_solids() -> None:
+    """Contacts, more contacts, contacts that leave one pose, and one that leaves a family."""
+    contacts, recognizer = _few(), Recognizer([_box()])
     belief = recognizer.update(recognizer.recognize(contacts), contacts)
-    predict(sample_belief(belief, [box], 64), ProbeSpace(1.0, 5.0).rays(np.zeros((1, 3))))
-    paths = FreeSpace(5.0 * np.eye(3), hits.points_world, error=0.01)
+    # Contacts all around leave one pose, whose neighbours are looked at.
+    sides = np.repeat(np.concatenate([np.eye(3), -np.eye(3)]), 3, axis=0)
+    aside = 0.3 * np.sin(np.arange(54.0)).reshape(18, 3) * (sides == 0.0)
+    hits = _hits(5.0 * sides + aside, -sides)
+    recognizer.recognize(
+        Contacts(hits.points_world, hits.normals_world, position_error=0.04, normal_error=0.1)
+    )
+    one = contacts[:1]
+    recognizer.sample_poses(recognizer.recognize(one).hypotheses[0], one, 4)
+    predict(sample_belief(belief, [_box()], 64), ProbeSpace(1.0, 5.0).rays(np.zeros((1, 3))))
+
+
+def recognize_in_surroundings() -> None:
+    """Free paths and a floor that the box stands on, and a pose to repair."""
+    contacts, recognizer = _few(), Recognizer([_box()])
+    paths = FreeSpace(5.0 * np.eye(3), contacts.positions, error=0.01)
     floor = SupportPlane(height=-1.5, error=0.01, resting=True)
     best = recognizer.recognize(contacts, free_space=paths, support=floor).hypotheses[0]
-    bounds = bounds_of(box, recognizer.features("box"), contacts, Surroundings.of(paths, floor))
+    surroundings = Surroundings.of(paths, floor)
+    bounds = bounds_of(_box(), recognizer.features("box"), contacts, surroundings)
     # A little off, so that there is something to repair.
     aside = best.pose.translation + [0.02, 0.0, 0.0]
     faces = best.interpretations[0].astype(np.int64)
     repair(faces, best.pose.rotation.as_matrix(), aside, bounds, steps=1)
-    one = contacts[:1]
-    recognizer.sample_poses(recognizer.recognize(one).hypotheses[0], one, 4)
-    prune(recognizer.tables("box"), contacts)
-    prune(recognizer.tables("box"), contacts, constraints=Constraints(triple=True, area=True))
+
+
+def prune_alone() -> None:
+    """The tree without poses, with triples too."""
+    tables = Recognizer([_box()]).tables("box")
+    prune(tables, _few())
+    prune(tables, _few(), constraints=Constraints(triple=True, area=True))
+
+
+def recognize_outlines() -> None:
+    """One contact with a rectangle."""
     square = Polygon.from_corners([(0.0, 0.0), (1.0, 0.0), (1.0, 2.0), (0.0, 2.0)], name="square")
-    # Contacts all around leave one pose, whose neighbours are looked at.
-    sides = np.repeat(np.concatenate([np.eye(3), -np.eye(3)]), 3, axis=0)
-    aside = 0.3 * np.sin(np.arange(54.0)).reshape(18, 3) * (sides == 0.0)
-    hits = cast_rays(box, RigidTransform.identity(), 5.0 * sides + aside, -sides)
-    around = Contacts(hits.points_world, hits.normals_world, position_error=0.04, normal_error=0.1)
-    recognizer.recognize(around)
     flat = Contacts([(0.5, 0.0)], [(0.0, -1.0)], position_error=0.01, normal_error=0.1)
-    flat_recognizer = Recognizer([square])
-    flat_recognizer.sample_poses(flat_recognizer.recognize(flat).hypotheses[0], flat, 4)
+    recognizer = Recognizer([square])
+    recognizer.sample_poses(recognizer.recognize(flat).hypotheses[0], flat, 4)
 
 
-if __name__ == "__main__":
-    warm_up()
+PARTS = (recognize_solids, recognize_outlines, prune_alone, recognize_in_surroundings)
+"""What can be compiled independently of all else."""
+
+
+def _box() -> Polyhedron:
+    import trimesh
+
+    return Polyhedron.from_mesh(trimesh.creation.box((1.0, 2.0, 3.0)), name="box")
+
+
+def _hits(starts: np.ndarray, directions: np.ndarray) -> RayHits:
+    return cast_rays(_box(), RigidTransform.identity(), starts, directions)
+
+
+def _few() -> Contacts:
+    hits = _hits(5.0 * np.eye(3), -np.eye(3))
+    return Contacts(hits.points_world, hits.normals_world, position_error=0.01, normal_error=0.1)

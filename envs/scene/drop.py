@@ -162,7 +162,7 @@ class DropScene:
     def _lift(self, rotation: Rotation) -> None:
         """Hold it over the plane, at rest."""
         mujoco.mj_resetData(self._compiled, self._data)
-        lowest = self._scale * rotation.apply(self._model.vertices)[:, 2].min()
+        lowest = self._scale * rotation.apply(self._model.vertices.copy())[:, 2].min()
         self._data.qpos[:3] = 0.0, 0.0, HEIGHT * DIAMETER - lowest
         self._data.qpos[3:] = rotation.as_quat(scalar_first=True)
 
@@ -181,7 +181,7 @@ class DropScene:
         shift = self._data.qpos[:3] / self._scale
         normals = rotation.apply(np.array([face.normal for face in self._faces]))
         tilts = np.arctan2(np.linalg.norm(normals[:, :2], axis=1), -normals[:, 2])
-        lowest = float(rotation.apply(self._model.vertices)[:, 2].min()) + float(shift[2])
+        lowest = float(rotation.apply(self._model.vertices.copy())[:, 2].min()) + float(shift[2])
         return Settled(
             T_world_object=RigidTransform.from_components(shift, rotation),
             face=self._faces[int(tilts.argmin())],

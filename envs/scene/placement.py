@@ -53,7 +53,7 @@ class AcrossPlane:
     def draw(self, rng: np.random.Generator, model: Polyhedron) -> RigidTransform:
         """A pose, model to world, uniform in orientation, offset and share sunk."""
         rotation = Rotation.random(rng=rng)
-        heights = rotation.apply(model.vertices)[:, 2]
+        heights = rotation.apply(model.vertices.copy())[:, 2]
         sunk = rng.uniform(*self.sunk)
         lift = -heights.min() - sunk * np.ptp(heights)
         return _around_origin(rng, rotation, model, self.offset, lift)
@@ -96,7 +96,7 @@ class Resting:
         else:
             parts = collision_parts(model, folder=self.parts_folder).parts
             rotation = DropScene(model, parts).drop(rng).upright
-        lift = -float(rotation.apply(model.vertices)[:, 2].min())
+        lift = -float(rotation.apply(model.vertices.copy())[:, 2].min())
         return _around_origin(rng, rotation, model, self.offset, lift)
 
     def support(self, model: Polyhedron) -> SupportPlane | None:
@@ -123,7 +123,7 @@ def _around_origin(
     rng: np.random.Generator, rotation: Rotation, model: Polyhedron, offset: float, lift: float
 ) -> RigidTransform:
     """A pose with the centroid above a point uniform in the disc of radius ``offset``."""
-    centroid = rotation.apply(model.centroid)
+    centroid = rotation.apply(model.centroid.copy())
     distance, bearing = offset * np.sqrt(rng.random()), rng.uniform(0.0, 2.0 * np.pi)
     along = distance * np.array([np.cos(bearing), np.sin(bearing)]) - centroid[:2]
     return RigidTransform.from_components([*along, lift], rotation)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ...recognizer.compiling import kernel
 from ...recognizer.poses.motions.motion_kernels import perpendicular
 
 
-@njit(cache=True)
+@kernel
 def blur_rows(touched, points, normals, directions, draws, even, radius, half_angle, moved, turned):
     """Move points, and turn unit vectors away from where they point.
 
@@ -43,7 +43,7 @@ def blur_rows(touched, points, normals, directions, draws, even, radius, half_an
         _lean(normals[row], cosine, 2.0 * np.pi * draws[2, row], turned[row])
 
 
-@njit(cache=True)
+@kernel
 def _lean(normal, cosine, around, turned):
     x, y, z = normal
     u0, u1, u2 = perpendicular(x, y, z)

@@ -38,7 +38,7 @@ class PlacedModel:
     @property
     def centre(self) -> Floats:
         """(3,) centroid in the world, metres."""
-        return self.rotation.apply(self.model.centroid) + self.position
+        return self.rotation.apply(self.model.centroid.copy()) + self.position
 
     @property
     def radius(self) -> float:

@@ -30,7 +30,7 @@ def same_answer(task: Task, samples: PoseSamples) -> NDArray[np.bool_]:
         rows = np.flatnonzero(samples.objects == number)
         model = samples.models[number]
         turns = Rotation.from_quat(samples.rotations[rows])
-        centres = turns.apply(model.centroid) + samples.positions[rows]
+        centres = turns.apply(model.centroid.copy()) + samples.positions[rows]
         most_shift = task.tolerance.distance(model.diameter, task.position_error)
         apart = np.linalg.norm(centres[:, None] - centres, axis=2)
         # Quaternions of two rotations half an angle h apart have |q . p| = cos h.

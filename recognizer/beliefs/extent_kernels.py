@@ -8,9 +8,8 @@ of an interpretation near that pose, and linear programs say how far it reaches.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from ..compiling import borrowing
+from ..compiling import borrowing, kernel
 from ..contacts.reading_kernels import UNKNOWN_NORMAL, carry, read, worst_on_pieces
 from ..poses.motions.motion_kernels import cross, move, perpendicular, slope_row, to_object
 from ..poses.proofs.polytope_kernels import all_within, box_of, take_needed
@@ -117,7 +116,7 @@ def contact_rows(faces, contacts, errors, model, half_angles, x, u, turn, rows, 
     return count
 
 
-@njit(cache=True)
+@kernel
 def strain(faces, contacts, model, rotation, translation):
     """The largest reading of a pose, in bounds; arguments as in `pose_kernels.settle`."""
     count = len(faces)
@@ -129,7 +128,7 @@ def strain(faces, contacts, model, rotation, translation):
     return max(worst, exact)
 
 
-@njit(cache=True)
+@kernel
 def look_around(
     interpretations,
     contacts,
@@ -208,7 +207,7 @@ def look_around(
     return box, alike and near > 0
 
 
-@njit(cache=True)
+@kernel
 def move_within(interpretation, contacts, model, pose, step):
     """Move a pose by a step, or by less of it, to where it meets all bounds of its contacts.
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from ..compiling import kernel
 
 
-@njit(cache=True)
+@kernel
 def group_poses(rotations, centres, symmetries, most_turn, most_shift):
     """Put each pose into the first group whose leader it is close to, or open a new one.
 
@@ -56,7 +57,7 @@ def group_poses(rotations, centres, symmetries, most_turn, most_shift):
     return groups
 
 
-@njit(cache=True)
+@kernel
 def weigh_poses(poses, centre, symmetries, radius, most_turn, most_shift, allowed):
     """Group poses, and weigh each group by the volumes of its poses; see `hypotheses.cluster`.
 
@@ -108,7 +109,7 @@ def weigh_poses(poses, centre, symmetries, radius, most_turn, most_shift, allowe
     return members, starts, matrices, covariances, log_weights, motions, loose
 
 
-@njit(cache=True)
+@kernel
 def _in_groups(rotations, translations, costs, proven, centre, symmetries, most_turn, most_shift):
     """Rows of poses group by group, best first, and where each group starts among them."""
     count = len(costs)

@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from ..compiling import kernel
 
 
-@njit(cache=True)
+@kernel
 def wrap(angle):
     """The same angle in [-pi, pi], radians."""
     return angle - 2.0 * np.pi * np.round(angle / (2.0 * np.pi))
 
 
-@njit(cache=True)
+@kernel
 def turn_between(u, v):
     """The angle by which (2,) ``u`` turns counter-clockwise into ``v``, radians in [-pi, pi]."""
     return np.arctan2(u[0] * v[1] - u[1] * v[0], u[0] * v[0] + u[1] * v[1])
 
 
-@njit(cache=True)
+@kernel
 def _point_segment_squared(p, a, b):
     e0, e1 = b[0] - a[0], b[1] - a[1]
     g0, g1 = p[0] - a[0], p[1] - a[1]
@@ -29,12 +30,12 @@ def _point_segment_squared(p, a, b):
     return g0 * g0 + g1 * g1
 
 
-@njit(cache=True)
+@kernel
 def _side(a, b, p):
     return (b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0])
 
 
-@njit(cache=True)
+@kernel
 def segment_distances(segments):
     """Smallest distance between every two of (e, 2, 2) segments, as (e, e); zero if they cross."""
     count = len(segments)

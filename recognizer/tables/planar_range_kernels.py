@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ..compiling import kernel
 from ..models.planar_kernels import turn_between
 
 
-@njit(cache=True)
+@kernel
 def tilt_ranges(segments, normals):
     """Range of the angle from edge a's normal to a direction from a point of a to one of b.
 

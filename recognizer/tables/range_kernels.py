@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from ..compiling import inlined, kernel
 
 _SEGMENT_EPS = 1e-300
 
 
-@njit(cache=True, inline="always")
+@inlined
 def _dot(a, b):
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@njit(cache=True)
+@kernel
 def segment_distance_squared(p, q, r, s):
     """Squared distance of the segments p-q and r-s, (3,) each (Ericson, Section 5.1.9)."""
     d1 = q - p
@@ -40,7 +41,7 @@ def segment_distance_squared(p, q, r, s):
     return _dot(gap, gap)
 
 
-@njit(cache=True)
+@kernel
 def point_triangle_distance_squared(p, a, b, c):
     """Squared distance of a point from a solid triangle, (3,) each (Ericson, Section 5.1.5).
 
@@ -83,7 +84,7 @@ def point_triangle_distance_squared(p, a, b, c):
     return _dot(gap, gap)
 
 
-@njit(cache=True)
+@kernel
 def triangle_distance_squared(s, t):
     """Squared distance of two solid triangles, (3, 3) each, that don't pierce each other."""
     best = np.inf
@@ -96,7 +97,7 @@ def triangle_distance_squared(s, t):
     return best
 
 
-@njit(cache=True)
+@kernel
 def nearest_distances(triangles, first):
     """Smallest distance between every two faces.
 
@@ -135,7 +136,7 @@ def nearest_distances(triangles, first):
     return nearest
 
 
-@njit(cache=True)
+@kernel
 def tilt_ranges(triangles, first, normals, offsets):
     """Range of the angle between face a's normal and the direction from a point of a to one of b.
 

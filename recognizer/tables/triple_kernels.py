@@ -7,17 +7,17 @@ there are as many triples of faces as a sixth of the cube of their number, most 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ..compiling import inlined, kernel
 from .triple_range_kernels import triple_range
 
 
-@njit(cache=True, inline="always")
+@inlined
 def _dot(a, b):
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@njit(cache=True)
+@kernel
 def _slot(keys, key):
     """Where a key is, or where it would be: open addressing, -1 is free."""
     last = len(keys) - 1
@@ -27,7 +27,7 @@ def _slot(keys, key):
     return at
 
 
-@njit(cache=True)
+@kernel
 def _roomier(keys, values, most):
     """Twice the room with all that is known in it; or, beyond ``most`` slots, an empty table."""
     if 2 * len(keys) > most:
@@ -44,7 +44,7 @@ def _roomier(keys, values, most):
     return larger, moved, used
 
 
-@njit(cache=True)
+@kernel
 def measured_triangle(points, reach, out):
     """Ranges of angles and area that three points inside their balls can have.
 
@@ -78,7 +78,7 @@ def measured_triangle(points, reach, out):
             out[3, 1] = 0.5 * twice + spread
 
 
-@njit(cache=True)
+@kernel
 def filter_triples(
     rows, positions, reach, angles, areas, geometry, dust, most, keys, values, used, terms, keep
 ):

@@ -18,7 +18,8 @@ end, but for c. The same n bounds the area s / 2 from below; from above the corn
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from ..compiling import inlined, kernel
 
 CORNER_TERMS = 11
 """Columns of the scratch array of `_corner_terms`."""
@@ -32,12 +33,12 @@ DUST = 1e-15
 """Terms below this share of the squared diameter are rounding and count as zero."""
 
 
-@njit(cache=True, inline="always")
+@inlined
 def _dot(a, b):
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@njit(cache=True)
+@kernel
 def _angle_between(u, v):
     apart = 0.0
     together = 0.0
@@ -47,7 +48,7 @@ def _angle_between(u, v):
     return 2.0 * np.arctan2(np.sqrt(apart), np.sqrt(together))
 
 
-@njit(cache=True)
+@kernel
 def direction_cones(corners, start, shortest):
     """A cone that holds all directions from a point of face a to one of face b (Appendix II).
 
@@ -104,7 +105,7 @@ def direction_cones(corners, start, shortest):
     return axes, half_angles
 
 
-@njit(cache=True)
+@kernel
 def annulus_range(axes, inner, outer, apex, left, right):
     """Range of the angle at a point of ``apex``, from what is known of either leg by itself.
 
@@ -139,7 +140,7 @@ def annulus_range(axes, inner, outer, apex, left, right):
     return least, most
 
 
-@njit(cache=True)
+@kernel
 def _corner_terms(corners, start, lifts, faces, terms):
     """u x w, its length, y at each apex, and y - |p - c|^2 at each, for all triples of corners."""
     a, b, c = faces
@@ -164,7 +165,7 @@ def _corner_terms(corners, start, lifts, faces, terms):
     return count
 
 
-@njit(cache=True)
+@kernel
 def _obtuse_least(terms, count, apex, dust):
     """The least angle if no corner's is acute, else 0."""
     least = np.pi
@@ -179,7 +180,7 @@ def _obtuse_least(terms, count, apex, dust):
     return least if seen else 0.0
 
 
-@njit(cache=True)
+@kernel
 def _acute_most(terms, count, apex, dust):
     """The greatest angle if no corner's is obtuse, after the apex's deduction, else pi."""
     most = 0.0
@@ -194,7 +195,7 @@ def _acute_most(terms, count, apex, dust):
     return most if seen else np.pi
 
 
-@njit(cache=True)
+@kernel
 def _acute_least(terms, count, apex, dust):
     """A bound up to pi / 2 below all angles, from x = n . (u x w) in the last column."""
     upper, lower = np.pi / 2, 0.0
@@ -209,7 +210,7 @@ def _acute_least(terms, count, apex, dust):
     return upper if upper >= lower else 0.0
 
 
-@njit(cache=True)
+@kernel
 def _obtuse_most(terms, count, apex, dust):
     """A bound from pi / 2 on above all angles, from x = n . (u x w) in the last column."""
     lower, upper = np.pi / 2, np.pi
@@ -224,7 +225,7 @@ def _obtuse_most(terms, count, apex, dust):
     return lower if lower <= upper else np.pi
 
 
-@njit(cache=True)
+@kernel
 def corner_ranges(corners, start, lifts, faces, dust, terms, out):
     """Ranges of a triangle's angles and area from the corners of the hulls of its faces.
 
@@ -270,7 +271,7 @@ def corner_ranges(corners, start, lifts, faces, dust, terms, out):
         n += share * step
 
 
-@njit(cache=True)
+@kernel
 def triple_range(corners, start, lifts, axes, inner, outer, faces, dust, terms, out):
     """Ranges of a triangle's angles and area; arguments as of `corner_ranges`, `annulus_range`."""
     corner_ranges(corners, start, lifts, faces, dust, terms, out)

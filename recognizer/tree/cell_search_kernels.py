@@ -9,9 +9,8 @@ contact that has no leaf in a cell has none in any part of it, so parts don't gr
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from ..compiling import borrowing
+from ..compiling import borrowing, kernel
 from .cell_kernels import facing
 from .forward_kernels import check_forward, take_lowest
 from .room_kernels import DIRECTIONS, enter, view_ways
@@ -124,7 +123,7 @@ def _passes(contacts, model, domains, first, spare, pairs, cell, facings, slabs,
     return False
 
 
-@njit(cache=True)
+@kernel
 def passing_cells(
     contacts,
     errors,

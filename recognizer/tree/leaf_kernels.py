@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from ..compiling import borrowing
+from ..compiling import borrowing, kernel
 
 SPARSE = 4
 """Places of the table for each row that there is room for."""
@@ -43,7 +42,7 @@ def place_of(faces, found_faces, slots):
     return at
 
 
-@njit(cache=True)
+@kernel
 def table_of(found_faces, found):
     """The table of the first ``found`` rows of those that there is room for, a power of two."""
     slots = np.full(SPARSE * len(found_faces), -1)
@@ -52,7 +51,7 @@ def table_of(found_faces, found):
     return slots
 
 
-@njit(cache=True)
+@kernel
 def found_space(most, n):
     """Room for so many interpretations of n contacts.
 
@@ -70,7 +69,7 @@ def found_space(most, n):
     )
 
 
-@njit(cache=True)
+@kernel
 def with_room(found):
     """The same interpretations with room for as many again."""
     most, n = found[0].shape

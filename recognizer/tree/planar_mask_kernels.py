@@ -7,8 +7,8 @@ in space. As there, every constant beside a bit set is an explicit ``np.uint64``
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ..compiling import kernel
 from ..models.planar_kernels import turn_between, wrap
 from .tree_kernels import ANGLE, COMPONENT, DISTANCE, TILT
 
@@ -18,13 +18,13 @@ ANGLE_ROUNDING = 1e-9
 _ONE = np.uint64(1)
 
 
-@njit(cache=True)
+@kernel
 def _apart(low, high, middle, half):
     """Whether the arcs [low, high] and middle -+ half, radians, have nothing in common."""
     return abs(wrap(0.5 * (low + high) - middle)) > 0.5 * (high - low) + half
 
 
-@njit(cache=True)
+@kernel
 def pair_masks(
     positions,
     normals,

@@ -9,9 +9,8 @@ directions, so that the meeting of many costs no more than that of two.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from ..compiling import borrowing
+from ..compiling import borrowing, kernel
 
 DIRECTIONS = np.array(
     [
@@ -37,7 +36,7 @@ SPARE = 1e-7
 a difference near zero makes as large as 1.5e-8."""
 
 
-@njit(cache=True)
+@kernel
 def feature_slabs(model):
     """(f, k, 2) the extent of each feature along each direction, metres."""
     first, corner_first, corners = model[2], model[3], model[4]

@@ -7,7 +7,8 @@ Python integer a uint64 would become signed and lose its highest bit.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from ..compiling import kernel
 
 DISTANCE, ANGLE, COMPONENT, TILT = 1, 2, 4, 8
 """Bits that switch the four constraints on."""
@@ -15,7 +16,7 @@ DISTANCE, ANGLE, COMPONENT, TILT = 1, 2, 4, 8
 _ONE = np.uint64(1)
 
 
-@njit(cache=True)
+@kernel
 def _angle_between(u, v):
     # Unlike the arc cosine of a dot product this is accurate at 0 and at pi.
     apart = 0.0
@@ -26,7 +27,7 @@ def _angle_between(u, v):
     return 2.0 * np.arctan2(np.sqrt(apart), np.sqrt(together))
 
 
-@njit(cache=True)
+@kernel
 def farthest_first(rows):
     """An order of (n, k) rows: the two farthest apart, then always the farthest from all before."""
     count = len(rows)
@@ -62,7 +63,7 @@ def farthest_first(rows):
     return order
 
 
-@njit(cache=True)
+@kernel
 def spread_first(positions, normals):
     """`farthest_first` by positions, as shares of their largest extent, and by half the normals."""
     count, dimension = positions.shape
@@ -80,7 +81,7 @@ def spread_first(positions, normals):
     return farthest_first(rows)
 
 
-@njit(cache=True)
+@kernel
 def least_span(points, errors):
     """The least that the farthest two of (n, 3) points can be apart, (n,) bounds on each."""
     most = 0.0
@@ -93,7 +94,7 @@ def least_span(points, errors):
     return most
 
 
-@njit(cache=True)
+@kernel
 def pair_masks(
     positions,
     normals,
@@ -192,7 +193,7 @@ def pair_masks(
                 domains[j, w] &= supported[w]
 
 
-@njit(cache=True)
+@kernel
 def grow(prefixes, domains, masks, stop, budget, nodes):
     """Extend interpretations of the first contacts to the first ``stop`` contacts.
 
@@ -279,7 +280,7 @@ def grow(prefixes, domains, masks, stop, budget, nodes):
     return leaves[:found].copy(), True
 
 
-@njit(cache=True)
+@kernel
 def _bit_index(single):
     index = 0
     for step in (32, 16, 8, 4, 2, 1):

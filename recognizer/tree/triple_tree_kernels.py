@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from ..compiling import kernel
 
 
-@njit(cache=True)
+@kernel
 def look_ahead(rows, domains, masks, stop, keep):
     """Drop interpretations that leave some later contact without a face.
 

@@ -124,16 +124,13 @@ def _tell(
     console.print(_matrix(found[0], units))
 
 
-def tell_verdict(
-    console: Console, recognizer: Recognizer, felt: FeltFile, belief: Belief
-) -> None:
+def tell_verdict(console: Console, recognizer: Recognizer, felt: FeltFile, belief: Belief) -> None:
     """What there is, what it amounts to, and if nothing fits, why that may be."""
     from ...recognizer.advice.verdict import Verdict, verdict
 
     misses = f" and {felt.misses} ways that met nothing" if felt.misses else ""
     console.print(
-        f"{len(felt.contacts)} contacts{misses}, {len(recognizer.models)} parts in the"
-        " library."
+        f"{len(felt.contacts)} contacts{misses}, {len(recognizer.models)} parts in the library."
     )
     word, found = verdict(belief), belief.hypotheses
     if not found:

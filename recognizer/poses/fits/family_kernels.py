@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from ...compiling import borrowing
+from ...compiling import borrowing, kernel
 from ...contacts.reading_kernels import carry, read, worst_on_pieces
 from ..motions.motion_kernels import move
 from ..proofs.proof_kernels import workspace
@@ -37,7 +36,7 @@ def _moved(rotation, translation, new_rotation, new_translation, model):
     return np.sqrt(shift + 0.5 * turn * radius * radius)
 
 
-@njit(cache=True)
+@kernel
 def span_family(
     faces,
     contacts,

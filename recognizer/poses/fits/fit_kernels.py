@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from ...compiling import borrowing
+from ...compiling import borrowing, kernel
 from ...contacts.reading_kernels import ARC, NO_CONE, carry, read
 from ...models.polygon_kernels import CORNER, INSIDE
 from ..motions.motion_kernels import add_row, move, slope_row, solve
@@ -115,7 +114,7 @@ def assemble_fit(bounded, count, faces, x, u, model, contacts, readings, system,
     return cost
 
 
-@njit(cache=True)
+@kernel
 def fit_pose(count, faces, contacts, model, most, rotation, translation, work):
     """Damped Gauss-Newton from a starting pose, in place; returns the misfit.
 

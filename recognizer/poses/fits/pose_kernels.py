@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from ...compiling import borrowing
+from ...compiling import borrowing, kernel
 from ...contacts.reading_kernels import carry, meets_all, read
 from ..motions.align_kernels import align, middle_translation
 from ..motions.motion_kernels import move
@@ -30,7 +29,7 @@ def _is_witness(count, faces, contacts, model, rotation, translation, work):
     return meets_all(count, faces, x, u, model, contacts, EXACT, spare)
 
 
-@njit(cache=True)
+@kernel
 def finish(count, faces, contacts, model, rotation, translation, work, information):
     """Move a witness to the best fit, or as far towards it as stays within the bounds, in place.
 
@@ -86,7 +85,7 @@ def weigh(count, faces, contacts, model, rotation, translation, work, informatio
     return cost
 
 
-@njit(cache=True)
+@kernel
 def start_pose(count, faces, contacts, model, half_angles, middles, rotation, translation):
     """The pose that the normals ask for; returns the same angle as `align_kernels.align`."""
     angle = align(count, faces, model, half_angles, contacts, rotation)
@@ -140,7 +139,7 @@ def settle(count, faces, contacts, model, ball, angle, most, rotation, translati
     )
 
 
-@njit(cache=True)
+@kernel
 def test_interpretations(interpretations, contacts, model, half_angles, middles, most_boxes, pool):
     """Judge interpretations one by one.
 

@@ -9,9 +9,8 @@ smaller a box, the smaller the remainders that its proof has to allow for. Two t
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from ...compiling import borrowing
+from ...compiling import borrowing, kernel
 from ...contacts.reading_kernels import carry, read, worst_on_pieces
 from ..motions.motion_kernels import copy_pose, copy_rotation, move
 from ..proofs.multiplier_kernels import set_levers
@@ -275,7 +274,7 @@ def search_poses(count, faces, contacts, model, angle, most, rotation, translati
     return UNDECIDED, most
 
 
-@njit(cache=True)
+@kernel
 def box_stack(count):
     """A stack of boxes for `search_poses`: poses, axes, centres, half sides, polygons, weights.
 

@@ -11,9 +11,8 @@ so that they lie along what these leave open.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from ...compiling import borrowing
+from ...compiling import borrowing, kernel
 from ...contacts.reading_kernels import UNKNOWN_NORMAL, carry, meets_all
 from ..motions.motion_kernels import add_row, copy_pose, move, slope_row
 from ..proofs.proof_kernels import workspace
@@ -118,7 +117,7 @@ def _walk(count, faces, contacts, model, draws, rotation, translation, poses, sp
                 high = at
 
 
-@njit(cache=True)
+@kernel
 def spread_over_families(
     faces, contacts, model, starts, motions, counts, jumps, draws, rotations, translations
 ):

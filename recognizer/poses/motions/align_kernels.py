@@ -8,9 +8,8 @@ the bounds allow is within an ellipsoid about it.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from ...compiling import borrowing
+from ...compiling import borrowing, kernel
 from ...contacts.reading_kernels import UNKNOWN_NORMAL
 
 ROUNDING = 1e-6
@@ -54,7 +53,7 @@ def diagonalise(matrix, vectors):
                     vectors[k, p], vectors[k, q] = c * left - s * right, s * left + c * right
 
 
-@njit(cache=True)
+@kernel
 def align(count, faces, model, half_angles, contacts, rotation):
     """The rotation that fits the normals best, written in place.
 

@@ -9,12 +9,11 @@ Everything happens in the object's frame: a pose ``(R, t)`` turns a contact ``p`
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from ...compiling import borrowing
+from ...compiling import borrowing, inlined
 
 
-@njit(cache=True, inline="always")
+@inlined
 def cross(a, b, out):
     """Vector product of (3,) ``a`` and ``b``, into ``out``."""
     out[0] = a[1] * b[2] - a[2] * b[1]

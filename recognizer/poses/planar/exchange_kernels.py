@@ -20,8 +20,8 @@ closed form.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ...compiling import inlined, kernel
 from .motion_kernels import EXACT, nearest_on_edge
 
 FOUND, EXCLUDED, OPEN = 1, 0, 2
@@ -29,12 +29,12 @@ FOUND, EXCLUDED, OPEN = 1, 0, 2
 MOST_EXCHANGES = 60
 
 
-@njit(cache=True, inline="always")
+@inlined
 def _cross(a0, a1, b0, b1):
     return a0 * b1 - a1 * b0
 
 
-@njit(cache=True)
+@kernel
 def _support(d0, d1, edge, outline):
     """The most that ``d . x`` is on an edge."""
     starts, tangents, lengths = outline[0], outline[1], outline[2]
@@ -42,7 +42,7 @@ def _support(d0, d1, edge, outline):
     return d0 * starts[edge, 0] + d1 * starts[edge, 1] + max(along * lengths[edge], 0.0)
 
 
-@njit(cache=True)
+@kernel
 def start_exchange(face, reach, outline, basis, bounds):
     """The first three bounds: from both sides of the first contact's edge, and past its end.
 
@@ -62,7 +62,7 @@ def start_exchange(face, reach, outline, basis, bounds):
         bounds[k, 2] = _support(bounds[k, 0], bounds[k, 1], face, outline) + reach
 
 
-@njit(cache=True)
+@kernel
 def least_excess(angle, faces, arms, reaches, outline, margin, basis, bounds, weights, y):
     """Solve the problem in y at one angle until it is decided, by exchanging bounds.
 
@@ -149,7 +149,7 @@ def least_excess(angle, faces, arms, reaches, outline, margin, basis, bounds, we
     return OPEN
 
 
-@njit(cache=True)
+@kernel
 def excluded_arc(arms, extent, margin, basis, bounds, weights):
     """The angles at which the weighted bounds are above the margin: middle and half-width, radians.
 

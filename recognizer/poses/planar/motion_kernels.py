@@ -15,15 +15,15 @@ normals (n,), radians; bounds (n,) and (n,).
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ...compiling import inlined, kernel
 from ...models.planar_kernels import wrap
 
 EXACT = 1e-9
 """How far beyond its bound a reading of a witness may be, as a share of the bound: rounding."""
 
 
-@njit(cache=True, inline="always")
+@inlined
 def nearest_on_edge(x, y, edge, outline):
     """From the nearest point of an edge to a point: the vector, and how far along the edge."""
     starts, tangents, lengths = outline[0], outline[1], outline[2]
@@ -33,7 +33,7 @@ def nearest_on_edge(x, y, edge, outline):
     return a - share * tangents[edge, 0], b - share * tangents[edge, 1], along
 
 
-@njit(cache=True)
+@kernel
 def meets(faces, contacts, outline, angle, place):
     """Whether a pose puts every reading within its bound, but for rounding."""
     points, directions, position_error, normal_error = contacts
@@ -52,7 +52,7 @@ def meets(faces, contacts, outline, angle, place):
     return True
 
 
-@njit(cache=True)
+@kernel
 def _add(row, residual, weight, system, gradient):
     for a in range(3):
         gradient[a] += weight * residual * row[a]
@@ -60,7 +60,7 @@ def _add(row, residual, weight, system, gradient):
             system[a, b] += weight * row[a] * row[b]
 
 
-@njit(cache=True)
+@kernel
 def assemble(bounded, faces, contacts, outline, angle, place, system, gradient):
     """Normal equations of the least-squares misfit at one pose; returns the misfit.
 
@@ -115,7 +115,7 @@ def assemble(bounded, faces, contacts, outline, angle, place, system, gradient):
     return cost
 
 
-@njit(cache=True)
+@kernel
 def _solve(system, gradient, damping, step):
     """Solve ``(system + damping) step = -gradient`` for three unknowns by Cholesky."""
     a = np.sqrt(system[0, 0] + damping)
@@ -132,7 +132,7 @@ def _solve(system, gradient, damping, step):
     step[0] = (u - b * step[1] - c * step[2]) / a
 
 
-@njit(cache=True)
+@kernel
 def move(angle, place, step, radius, new_place):
     """Apply a small motion, rotation times the radius and shift; returns the new angle."""
     cosine, sine = np.cos(angle), np.sin(angle)
@@ -141,7 +141,7 @@ def move(angle, place, step, radius, new_place):
     return angle + step[0] / radius
 
 
-@njit(cache=True)
+@kernel
 def fit(faces, contacts, outline, most, angle, place):
     """Damped Gauss-Newton from a starting pose; ``place`` is moved, the new angle returned.
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ...compiling import kernel
 from ...models.planar_kernels import wrap
 from .motion_kernels import assemble, fit, meets, move, nearest_on_edge
 from .search_kernels import search_rotations
@@ -17,7 +17,7 @@ MOST_DRAWS = 8
 MOST_NUDGES = 100
 
 
-@njit(cache=True)
+@kernel
 def _arms(points):
     """Contacts (n, 2) from their mean, and the mean (2,)."""
     mean = np.zeros(2)
@@ -26,7 +26,7 @@ def _arms(points):
     return points - mean, mean
 
 
-@njit(cache=True)
+@kernel
 def reject(interpretations, contacts, outline, most):
     """Verdicts on interpretations (m, n) alone, as (m,): see `search_rotations`."""
     count = len(contacts[0])
@@ -45,7 +45,7 @@ def reject(interpretations, contacts, outline, most):
     return verdicts
 
 
-@njit(cache=True)
+@kernel
 def _join(arcs, count):
     """Merge (k, 2) arcs that meet end to end, in place; returns how many are left."""
     order = np.argsort(arcs[:count, 0])
@@ -64,7 +64,7 @@ def _join(arcs, count):
     return joined
 
 
-@njit(cache=True)
+@kernel
 def _nearest_witness(witnesses, found, low, high):
     """The witness within an arc that is nearest to its middle; -1 if there is none."""
     best, where = np.inf, -1
@@ -75,7 +75,7 @@ def _nearest_witness(witnesses, found, low, high):
     return where
 
 
-@njit(cache=True)
+@kernel
 def _place(angle, y0, y1, mean, place):
     """The centroid's place, where the contacts' mean is at ``y`` in the object's frame."""
     cosine, sine = np.cos(angle), np.sin(angle)
@@ -83,7 +83,7 @@ def _place(angle, y0, y1, mean, place):
     place[1] = mean[1] - (sine * y0 + cosine * y1)
 
 
-@njit(cache=True)
+@kernel
 def _draw_to_fit(faces, contacts, outline, low, high, angle, place):
     """From a pose within the bounds towards the fit as far as they allow; returns the angle."""
     fitted_place = place.copy()
@@ -100,7 +100,7 @@ def _draw_to_fit(faces, contacts, outline, low, high, angle, place):
     return angle
 
 
-@njit(cache=True)
+@kernel
 def test_interpretations(interpretations, contacts, outline, most, resolution):
     """Find the poses of each interpretation: one for every arc of rotations it can have.
 
@@ -174,7 +174,7 @@ def test_interpretations(interpretations, contacts, outline, most, resolution):
     )
 
 
-@njit(cache=True)
+@kernel
 def _nudge(faces, contacts, outline, angle, place):
     """Shift a pose back into the bounds, the worst first: projections onto convex sets.
 
@@ -201,7 +201,7 @@ def _nudge(faces, contacts, outline, angle, place):
         place[1] += sine * s0 + cosine * s1
 
 
-@njit(cache=True)
+@kernel
 def span_family(faces, contacts, outline, angle, place, motions, step, angles, places):
     """Poses that meet all bounds, a step apart along given motions, spreading from a first one.
 

@@ -8,8 +8,8 @@ that is.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ...compiling import kernel
 from ...models.planar_kernels import wrap
 from .exchange_kernels import EXCLUDED, FOUND, excluded_arc, least_excess, start_exchange
 from .motion_kernels import EXACT
@@ -18,7 +18,7 @@ NARROWEST = 1e-10
 """Arcs (radians) that aren't halved any more: less than any bound can tell apart."""
 
 
-@njit(cache=True)
+@kernel
 def allowed_rotations(faces, contacts, outline, arcs):
     """The angles at which every normal is within its bound; returns how many arcs there are.
 
@@ -62,7 +62,7 @@ def allowed_rotations(faces, contacts, outline, arcs):
     return count
 
 
-@njit(cache=True)
+@kernel
 def _cut(arcs, marks, count, low, high):
     """Take the open arc from low to high out of all arcs; returns how many there are then."""
     for j in range(count - 1, -1, -1):
@@ -85,7 +85,7 @@ def _cut(arcs, marks, count, low, high):
     return count
 
 
-@njit(cache=True)
+@kernel
 def _next_arc(arcs, marks, count, resolution):
     """The widest arc still to be looked at, those beside no witness first; -1 if there is none."""
     at, widest = -1, -1.0
@@ -100,7 +100,7 @@ def _next_arc(arcs, marks, count, resolution):
     return at if at >= 0 else beside
 
 
-@njit(cache=True)
+@kernel
 def search_rotations(faces, contacts, arms, outline, most, resolution, arcs, marks, witnesses):
     """Look for poses over all rotations; what is left of them can't be excluded.
 

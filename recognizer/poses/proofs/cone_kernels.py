@@ -8,9 +8,8 @@ a chord of the face's normal ``m``: ``|u' - m|^2 = 2 - 2 m . u'``. That form in 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from ...compiling import borrowing, vectorised
+from ...compiling import borrowing, kernel, vectorised
 from ...contacts.reading_kernels import RAY
 
 TERMS = 12
@@ -18,7 +17,7 @@ TERMS = 12
 square, nothing."""
 
 
-@njit(cache=True)
+@kernel
 def cone_table(count):
     """Room for so many cones: terms, misses and normals in chords, weights, sums of terms."""
     return np.empty((count, TERMS)), np.empty((6, count)), np.empty(count), np.empty(TERMS)

@@ -11,9 +11,8 @@ circle, so that a few points tell whether there is any direction.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from ...compiling import borrowing
+from ...compiling import borrowing, kernel
 from ..motions.motion_kernels import perpendicular
 
 PARALLEL = 1e-14
@@ -38,7 +37,7 @@ OVERSHOOT = 0.1
 """By how much that one is inside its circle, as a share of how far the last was outside."""
 
 
-@njit(cache=True)
+@kernel
 def lean_space(count):
     """Work space for so many contacts: circles, a core of them, a group's members and signs.
 

@@ -7,13 +7,12 @@ A place is that of a contact along a direction. A small motion ``z = (w, s)`` lo
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from ...compiling import borrowing, vectorised
+from ...compiling import borrowing, kernel, vectorised
 from ...models.polygon_kernels import INSIDE
 
 
-@njit(cache=True)
+@kernel
 def place_table(count):
     """Room for so many places.
 

@@ -7,9 +7,8 @@ is a linear program; how far the shadow on three of the six motions reaches anyw
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from ...compiling import borrowing
+from ...compiling import borrowing, kernel
 from .simplex_kernels import farther, forget_vertex
 
 CUTS = 24
@@ -42,7 +41,7 @@ def take_needed(rows, limits, count, low, high, columns):
     return left
 
 
-@njit(cache=True)
+@kernel
 def box_of(axes, columns, count, low, high, space):
     """How far a polytope reaches along directions, there and back.
 
@@ -121,7 +120,7 @@ def _cut(planes, heights, number, corners, height):
     return kept
 
 
-@njit(cache=True)
+@kernel
 def all_within(first, axes, box, allowed, columns, count, low, high, space):
     """Whether three of the six motions together are nowhere longer in a polytope than is allowed.
 

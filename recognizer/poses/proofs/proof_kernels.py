@@ -12,9 +12,8 @@ bounds.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from ...compiling import borrowing
+from ...compiling import borrowing, kernel
 from ...contacts.reading_kernels import ARC, NO_CONE, cone_support
 from .multiplier_kernels import assemble, set_levers, set_multipliers, solve_in_ball
 from .region_kernels import (
@@ -166,7 +165,7 @@ def motion_allowance(slope, form, angle, ball_angle, reach, region, product, roo
     return linear + min(angle * angle / 6.0, 2.0) * angle * turn + bend
 
 
-@njit(cache=True)
+@kernel
 def barrier_workspace():
     """Work space of `feasibility_kernels.seek_feasible`: systems, vectors, and a trial pose."""
     return (
@@ -177,7 +176,7 @@ def barrier_workspace():
     )
 
 
-@njit(cache=True)
+@kernel
 def workspace(count):
     """Work space of `judge` for a number of contacts."""
     readings = (

@@ -11,9 +11,8 @@ the half radian that the normals leave to the degree that the positions allow.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from ...compiling import borrowing
+from ...compiling import borrowing, kernel
 from .cone_kernels import add_cones, cone_table, note_cones, raise_cones
 from .place_kernels import (
     add_places,
@@ -178,7 +177,7 @@ def ball_radius(angle, longest):
     return angle * 0.5 * longest / np.sin(0.5 * longest) + 1e-9
 
 
-@njit(cache=True)
+@kernel
 def region_workspace(count):
     """Work space of `bound_region` for a number of contacts, with a region in it.
 

@@ -10,9 +10,8 @@ optimisation; here it leaves a tenth of the boxes that branch and bound otherwis
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from ...compiling import borrowing
+from ...compiling import borrowing, kernel
 from ..motions.align_kernels import diagonalise
 from .inequality_kernels import ROUNDING, add_contact
 from .simplex_kernels import farther, forget_vertex, simplex_space
@@ -25,7 +24,7 @@ WORTHWHILE = 0.85
 """... as long as a round leaves less than this share of its volume."""
 
 
-@njit(cache=True)
+@kernel
 def shrink_space(count):
     """Work space of `shrink_box` for a number of contacts."""
     return (

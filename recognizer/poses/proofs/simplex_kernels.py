@@ -10,9 +10,8 @@ rounding takes nothing from them.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from ...compiling import borrowing, vectorised
+from ...compiling import borrowing, kernel, vectorised
 
 PIVOTS = 60
 """The most of a program."""
@@ -26,7 +25,7 @@ BOX = 12
 """Inequalities below this number are the box's own: low and high of each variable in turn."""
 
 
-@njit(cache=True)
+@kernel
 def simplex_space(most):
     """Work space of programs with so many inequalities, and the vertex that the last one ended at.
 

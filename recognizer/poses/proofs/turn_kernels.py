@@ -10,16 +10,15 @@ costs far less than a verdict, which rejects the same and more.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from ...compiling import borrowing
+from ...compiling import borrowing, kernel
 from ...contacts.reading_kernels import ARC, NO_CONE, UNKNOWN_NORMAL, nearest_in_cone
 
 ROUNDING = 1e-6
 """Angle (radians) put down to rounding: an arc cosine loses half the digits at its ends."""
 
 
-@njit(cache=True)
+@kernel
 def turn_space(count):
     """Work space of `open_turns`: angles allowed, vectors between contacts, and directions."""
     return np.empty((count, count, 2)), np.empty((count, count, 3)), np.empty(3), np.empty(3)

@@ -13,9 +13,8 @@ searches of branches are paid for by boxes that leaves have taken before.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from ...compiling import borrowing
+from ...compiling import borrowing, kernel
 from ..fits.pose_kernels import settle, start_pose
 from ..fits.verdict_kernels import FEASIBLE, REJECTED
 from ..motions.align_kernels import middle_translation
@@ -60,7 +59,7 @@ def due_branch(start, depth, spent, due):
     return -1
 
 
-@njit(cache=True)
+@kernel
 def search_branch(
     depth,
     faces,
@@ -111,7 +110,7 @@ def search_branch(
     )
 
 
-@njit(cache=True)
+@kernel
 def back_to(
     start,
     depth,

@@ -8,9 +8,8 @@ that the assigned contacts allow, and where there is none, the branch ends.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from ...compiling import borrowing
+from ...compiling import borrowing, kernel
 from ...tree.forward_kernels import check_forward, take_lowest
 from ...tree.room_kernels import DIRECTIONS, enter
 from ..fits.pose_kernels import start_pose
@@ -35,7 +34,7 @@ COUNTS = 6
 """Places of the counts that a search returns."""
 
 
-@njit(cache=True)
+@kernel
 def branch_space(n, words, features):
     """What is kept of the branch at each depth while a search goes down and up.
 
@@ -55,7 +54,7 @@ def branch_space(n, words, features):
     )
 
 
-@njit(cache=True)
+@kernel
 def branch_poses(n):
     """Of the branch at each depth, (n + 1, ...), the last depth that has a pose, -1 if none, and
     there a rotation, a translation, and an angle that no rotation within the bounds is farther."""
@@ -67,7 +66,7 @@ def branch_poses(n):
     )
 
 
-@njit(cache=True)
+@kernel
 def pose_space(n):
     """Work space for the poses of branches and leaves.
 
@@ -157,7 +156,7 @@ def count_ways(depth, sizes):
     return empty, completions
 
 
-@njit(cache=True)
+@kernel
 def start_branch(depth, faces, problem, cell, poses, rotation, translation, aligned):
     """Where the poses of a branch are: about that of a shorter one, or as the normals have it.
 

@@ -9,9 +9,8 @@ ends the branch, and where there is one, features of later contacts are ruled ou
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from ...compiling import borrowing
+from ...compiling import borrowing, kernel
 from ...tree.cell_search_kernels import passing_cells, view_cell
 from ...tree.leaf_kernels import found_space, place_of, table_of, with_room
 from ...tree.mask_kernels import pair_readings
@@ -52,7 +51,7 @@ def share_of(most_boxes, pool, whole):
     return min(most_boxes if pool >= SCARCE * whole else SPARING, most_boxes, pool)
 
 
-@njit(cache=True)
+@kernel
 def try_leaf(
     start, n, faces, problem, cell, angle, most, pool, effort, rotation, translation, spare, space
 ):
@@ -110,7 +109,7 @@ def try_leaf(
     return verdict, branch, looked + more
 
 
-@njit(cache=True)
+@kernel
 def search_model(
     contacts,
     errors,

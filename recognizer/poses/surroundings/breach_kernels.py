@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from ...compiling import borrowing
+from ...compiling import borrowing, kernel
 from ...contacts.reading_kernels import cone_support
 from ...models.distance_kernels import deepest, signed_distance
 
@@ -99,7 +98,7 @@ def pierced_paths(paths, pose, bound, model, solid_faces, broken, worst_places, 
     return count
 
 
-@njit(cache=True)
+@kernel
 def move_inside(place, clearance, model, solid_faces, nearest, near, trial):
     """Move a place of a path, within the radius around it that is free, into the object.
 
@@ -125,7 +124,7 @@ def move_inside(place, clearance, model, solid_faces, nearest, near, trial):
     return 0.0 if least < 0.0 else 1.0
 
 
-@njit(cache=True)
+@kernel
 def _depth_at(x, model, solid_faces, near):
     nearest = np.empty(3)
     return signed_distance(x, model, solid_faces, nearest, near)

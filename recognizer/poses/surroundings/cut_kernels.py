@@ -10,8 +10,8 @@ there is none: every reading added holds at every pose that breaks nothing.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ...compiling import kernel
 from ...contacts.reading_kernels import carry, read
 from ...models.distance_kernels import signed_distance
 from ..fits.pose_kernels import settle, weigh
@@ -42,7 +42,7 @@ PLACES = 8
 NOTHING, CUT, STUCK = 0, 1, 2
 
 
-@njit(cache=True)
+@kernel
 def _cut_paths(
     row,
     depth,
@@ -117,7 +117,7 @@ def _cut_paths(
     return True
 
 
-@njit(cache=True)
+@kernel
 def _cut(
     count,
     depth,
@@ -211,7 +211,7 @@ def _cut(
     return CUT
 
 
-@njit(cache=True)
+@kernel
 def clear_pose(
     count,
     faces,
@@ -351,7 +351,7 @@ def clear_pose(
         undecided |= verdict == UNDECIDED
 
 
-@njit(cache=True)
+@kernel
 def clear_poses(
     interpretations,
     proven,

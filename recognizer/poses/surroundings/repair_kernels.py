@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from ...compiling import borrowing
+from ...compiling import borrowing, kernel
 from ...contacts.reading_kernels import ARC, NO_CONE, carry, cone_support, read, worst_on_pieces
 from ...models.distance_kernels import deepest, signed_distance
 from ...models.polygon_kernels import foot_in_polygon
@@ -263,7 +262,7 @@ def _path_rows(at, paths, scales, pose, bound, model, solid_faces, space, rows, 
     return at
 
 
-@njit(cache=True)
+@kernel
 def bound_rows(
     faces,
     contacts,
@@ -334,7 +333,7 @@ def bound_rows(
     return values[:at].copy(), rows[:at].copy(), met
 
 
-@njit(cache=True)
+@kernel
 def apply_motion(rotation, translation, step, centre, radius):
     """A pose after a small motion, see `motion_kernels.move`."""
     turned, shifted = np.empty((3, 3)), np.empty(3)

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from ...compiling import borrowing
+from ...compiling import borrowing, kernel
 from ...models.polygon_kernels import nearest_in_polygon
 from ..proofs.region_kernels import largest_eigenvalue, remainder, square_root
 
@@ -16,7 +15,7 @@ ROUND = 12.0
 PATH, SUPPORT, APPROACH = 0, 1, 2
 
 
-@njit(cache=True)
+@kernel
 def cut_levels(solid_faces):
     """What is kept of each cut: kinds, margins, choices left, choices with the ends of their slabs,
     the place cut and how far it can go, and the pose cut with a bound on turns from it."""
@@ -50,7 +49,7 @@ def span_along(lever, direction, region, root, angle, row):
     return mean + np.sqrt(max(squared, 0.0)) + remainder(lever, direction, root, angle)
 
 
-@njit(cache=True)
+@kernel
 def farthest_move(lever, region, angle, farthest):
     """How far a lever's end can go at all within a region, metres."""
     inverse, centre = region[1], region[2]
@@ -104,7 +103,7 @@ def held_along(place, direction, row, faces, x, model, reaches, turn):
     return least
 
 
-@njit(cache=True)
+@kernel
 def set_slab(slot, face, model, place, low, high, size):
     """Make a slot's feature a square in the middle of a slab over a face's plane."""
     normals, offsets, _, start, corners, _, _, cone_start, cone_normals = model
@@ -130,7 +129,7 @@ def set_slab(slot, face, model, place, low, high, size):
     corners[first + 3] = foot + size * (one - other)
 
 
-@njit(cache=True)
+@kernel
 def set_point(slot, corner, normal, model):
     """Make a slot's feature a corner."""
     normals, offsets, _, start, corners, _, _, cone_start, cone_normals = model
@@ -140,7 +139,7 @@ def set_point(slot, corner, normal, model):
     corners[start[slot]] = corner
 
 
-@njit(cache=True)
+@kernel
 def _order_choices(count, choices, ends, place, model):
     """Sort the faces of a cut, the nearest plane last: choices are taken from there."""
     normals, offsets = model[0], model[1]
@@ -157,7 +156,7 @@ def _order_choices(count, choices, ends, place, model):
         choices[j], ends[j, 0], ends[j, 1] = f, low, high
 
 
-@njit(cache=True)
+@kernel
 def list_exits(
     place, clearance, row, faces, farthest, most, solid_faces, contacts, model, work, angle, out
 ):
@@ -223,7 +222,7 @@ def list_exits(
     return found, away
 
 
-@njit(cache=True)
+@kernel
 def cut_path(level, row, place, found, away, contacts, model, pose, levels):
     """Note a place of a free path in the object as a cut: it leaves through one of some faces.
 
@@ -252,7 +251,7 @@ def cut_path(level, row, place, found, away, contacts, model, pose, levels):
     _order_choices(found, choices[level], ends[level], place, model)
 
 
-@njit(cache=True)
+@kernel
 def cut_support(
     level, row, faces, slot, corner, sign, limit, up, farthest, contacts, model, pose, work, levels
 ):
@@ -284,7 +283,7 @@ def cut_support(
     set_point(slot, corner, normal, model)
 
 
-@njit(cache=True)
+@kernel
 def cut_approach(level, row, contact, face, direction, least, contacts, levels):
     """A contact seen from behind: its normal is within some angle of where the finger came from.
 

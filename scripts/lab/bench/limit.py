@@ -50,7 +50,7 @@ def mean_pose(case: Case, seed: int = 0) -> RigidTransform:
         np.random.default_rng(seed),
     )
     rotation = Rotation.from_matrix(turn)
-    return RigidTransform.from_components(centre - rotation.apply(model.centroid), rotation)
+    return RigidTransform.from_components(centre - rotation.apply(model.centroid.copy()), rotation)
 
 
 @njit(cache=True)

@@ -114,7 +114,7 @@ def resting(
     while True:
         turned = Rotation.from_rotvec(tilt * level) * spun
         heights = turned.apply(face.corners) @ up
-        lowest = float((turned.apply(model.vertices) @ up).min())
+        lowest = float((turned.apply(model.vertices.copy()) @ up).min())
         # The face may be between these two places; nothing may be below the lower one.
         low, high = lowest + INSIDE * error, heights.max() - INSIDE * error
         if high <= low:

@@ -17,8 +17,8 @@ from ....envs.sensors.range_image import RangeView, take_image
 from ....envs.sensors.range_sensor import MEMO_SPACING
 from ....recognizer import Contacts, pose_difference
 from ....recognizer.models.rays import cast_rays
+from ...report.drawing import in_style, svg_of
 from ...report.plots import COLOURS
-from ..plots import in_style, svg_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -136,7 +136,7 @@ def _draw_pose(panel: Axes, row: PictureRow, found: FoundPose) -> None:
     hits = cast_rays(model, found.pose, starts, np.tile(view.direction_world, (len(starts), 1)))
     faces = hits.faces.reshape(count, count)
     axes = np.stack([view.right_world, view.down_world, -view.direction_world])
-    light = _light_on(found.pose.rotation.apply(model.normals) @ axes.T)
+    light = _light_on(found.pose.rotation.apply(model.normals.copy()) @ axes.T)
     body = np.array(RIGHT_BODY if found.right else WRONG_BODY)
     colours = np.where((faces < 0)[..., None], 1.0, light[faces][..., None] * body)
     colours[_edges(faces)] = INK

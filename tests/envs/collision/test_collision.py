@@ -119,7 +119,7 @@ def test_a_convex_solid_is_its_own_part(name):
 @pytest.mark.parametrize("name", ["housing", "pocketed"])
 def test_size_and_attitude_make_no_difference(name, scale):
     model = replace(oracles.model(name), name="mine")
-    turned = remade(model, scale * ROTATION.apply(model.vertices))
+    turned = remade(model, scale * ROTATION.apply(model.vertices.copy()))
     found = worked_out_parts(turned)
     assert len(found.parts) == len(worked_out_parts(model).parts)
     assert found.stray <= 1e-9 * turned.diameter
@@ -129,7 +129,7 @@ def test_size_and_attitude_make_no_difference(name, scale):
 @pytest.mark.parametrize("name", [*STAND_IN_NAMES, "holed", "hull-20"])
 def test_coordinates_in_single_precision_cost_only_what_they_round(name):
     model = replace(oracles.model(name), name="mine")
-    rounded = remade(model, ROTATION.apply(model.vertices).astype(np.float32).astype(float))
+    rounded = remade(model, ROTATION.apply(model.vertices.copy()).astype(np.float32).astype(float))
     found = worked_out_parts(rounded)
     assert found.stray <= 2e-6 * rounded.diameter
     assert len(found.parts) <= len(worked_out_parts(model).parts) + 1

@@ -40,7 +40,7 @@ def test_the_stray_of_a_box_too_large_or_too_small_is_that_of_its_corners(share)
 @pytest.mark.parametrize("name", ["housing", "complex-hand"])
 def test_no_point_of_a_rounded_solid_is_farther_off_than_the_stray(name):
     model = replace(oracles.model(name), name="mine")
-    rounded = remade(model, ROTATION.apply(model.vertices).astype(np.float32).astype(float))
+    rounded = remade(model, ROTATION.apply(model.vertices.copy()).astype(np.float32).astype(float))
     found = worked_out_parts(rounded)
     rng = np.random.default_rng(2)
     on_mesh = oracles.points_on(rounded, rng.integers(len(rounded.triangles), size=300), rng)

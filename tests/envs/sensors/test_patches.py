@@ -185,7 +185,7 @@ def window_depths(solid: Polyhedron, rng: np.random.Generator, columns: int, row
     starts = np.column_stack([at, np.full(len(at), 0.5)])
     hits = cast_rays(solid, pose, starts, np.tile([0.0, 0.0, -1.0], (len(starts), 1)))
     depths = np.where(hits.hit, hits.distances, np.nan)
-    normals = pose.rotation.apply(solid.normals)[hits.faces]
+    normals = pose.rotation.apply(solid.normals.copy())[hits.faces]
     return depths.reshape(columns, rows), normals.reshape(columns, rows, 3)
 
 

@@ -249,7 +249,7 @@ def test_a_small_motion_along_a_freedom_changes_no_reading(faces: list[int]) -> 
 
     def readings(step: NDArray[np.float64]) -> NDArray[np.float64]:
         spin = Rotation.from_rotvec(step[:3] / radius)
-        shift = WEDGE.centroid + step[3:] - spin.apply(WEDGE.centroid)
+        shift = WEDGE.centroid + step[3:] - spin.apply(WEDGE.centroid.copy())
         moved = hypothesis.pose * RigidTransform.from_components(shift, spin)
         R, t = moved.rotation.as_matrix(), moved.translation
         heights = ((contacts.positions - t) @ R * normals).sum(axis=1) - offsets

@@ -185,7 +185,7 @@ def test_the_information_is_that_of_small_motions() -> None:
 
     def misfit(step: NDArray[np.float64]) -> float:
         turn = Rotation.from_rotvec(step[:3] / radius)
-        shift = model.centroid + step[3:] - turn.apply(model.centroid)
+        shift = model.centroid + step[3:] - turn.apply(model.centroid.copy())
         moved = pose * RigidTransform.from_components(shift, turn)
         felt = move(moved.inv(), contacts)
         normals, offsets = model.normals[touches.faces], model.offsets[touches.faces]

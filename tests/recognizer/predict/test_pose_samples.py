@@ -132,7 +132,7 @@ def test_samples_scatter_as_those_that_rejection_leaves_of_a_box_around_the_fami
     assert len(members) == MOST_OF_ONE
     turns = Rotation.from_quat(samples.rotations[members])
     own = turns[0]
-    centres = samples.positions[members] + turns.apply(solid.centroid)
+    centres = samples.positions[members] + turns.apply(solid.centroid.copy())
     ours = np.hstack([centres, (turns * own.inv()).as_rotvec()])
     axes = np.linalg.svd(ours - ours.mean(axis=0), full_matrices=False)[2]
     along = (ours - ours.mean(axis=0)) @ axes.T
@@ -185,7 +185,9 @@ def test_samples_of_an_object_that_stands_stand():
     recognizer, rng = Recognizer([solid]), np.random.default_rng(5)
     error = 1e-3
     turn = Rotation.from_rotvec([0.0, 0.0, 0.7])
-    pose = RigidTransform.from_components([0.0, 0.0, -turn.apply(solid.vertices)[:, 2].min()], turn)
+    pose = RigidTransform.from_components(
+        [0.0, 0.0, -turn.apply(solid.vertices.copy())[:, 2].min()], turn
+    )
     contacts, _ = random_contacts(solid, pose, 2, rng, position_error=0.01, normal_error=0.2)
     support = SupportPlane(error=error, resting=True)
     belief = recognizer.recognize(contacts, support=support)

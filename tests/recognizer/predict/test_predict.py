@@ -57,7 +57,7 @@ def about_the_origin(solid: Polyhedron, rng: np.random.Generator) -> RigidTransf
     """Any orientation, the centroid about a quarter of the diameter around the origin."""
     turn = random_pose(rng, 0.0).rotation
     place = 0.25 * solid.diameter * rng.uniform(-1.0, 1.0, 3)
-    return RigidTransform.from_components(place - turn.apply(solid.centroid), turn)
+    return RigidTransform.from_components(place - turn.apply(solid.centroid.copy()), turn)
 
 
 def triads(solid: Polyhedron, count: int, rng: np.random.Generator) -> TriadRays:
@@ -114,7 +114,9 @@ def test_rays_through_edges_and_corners_meet_the_solid():
     solid, rng = model("cube"), np.random.default_rng(3)
     for _ in range(20):
         turn = random_pose(rng, 0.0).rotation
-        pose = RigidTransform.from_components(-turn.apply(solid.centroid) + [0, 0, 2.0], turn)
+        pose = RigidTransform.from_components(
+            -turn.apply(solid.centroid.copy()) + [0, 0, 2.0], turn
+        )
         ends = np.concatenate([solid.vertices, solid.edges.mean(axis=1)])
         down = -np.array([[0.3, 0.2, 0.9]]) / np.linalg.norm([0.3, 0.2, 0.9])
         # A corner that is seen against the sky may be met or not: move in by a millionth.

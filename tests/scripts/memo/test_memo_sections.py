@@ -38,10 +38,12 @@ from palpate.scripts.memo.errors import trials as memo_errors_trials
 from palpate.scripts.memo.errors.judge import judge, neighbours
 from palpate.scripts.memo.errors.trials import METHODS, Errors, pose_errors
 from palpate.scripts.memo.page import write_sections
+from palpate.scripts.memo.plan import Trials
 from palpate.scripts.memo.range import range as memo_range
 from palpate.scripts.memo.range import trials as memo_range_trials
 from palpate.scripts.memo.range.trials import generator, interpret, memo_noise, readings, take_view
 from palpate.scripts.memo.section import Experiment, Figure, Section
+from palpate.scripts.memo.trial import Spec
 
 EXPERIMENTS: dict[str, Experiment] = {
     "table5": memo_errors.run,
@@ -143,13 +145,13 @@ def find_nothing(*arguments: Any, **named: Any) -> Pruned:
     [
         (
             memo_errors_trials,
-            lambda: memo_errors.measure_errors(memo_errors.Trials("housing", 10, 0.05, 0, 0, 3)),
+            lambda: memo_errors.measure_errors(Trials(Spec("housing", 10, 0.05), 0, 0, 3)),
         ),
-        (memo_range_trials, lambda: memo_range.scan_views(memo_range.Trials(9, 0, 0, 3))),
-        (memo_bounds_counts, lambda: memo_bounds.count_nodes(memo_bounds.Trials("cube", 0, 0, 3))),
+        (memo_range_trials, lambda: memo_range.scan_views(Trials(9, 0, 0, 3))),
+        (memo_bounds_counts, lambda: memo_bounds.count_nodes(Trials("cube", 0, 0, 3))),
         (
             memo_timing_trials,
-            lambda: memo_timing.measure_times(memo_timing.Trials(10, 0.05, 0, 0, 3)),
+            lambda: memo_timing.measure_times(Trials(Spec("housing", 10, 0.05), 0, 0, 3)),
         ),
     ],
 )
@@ -324,8 +326,8 @@ def test_each_counter_counts_no_more_than_the_one_before():
     assert (everything >= 1).all()
 
 
-def some_cases() -> list[memo_bounds.Trials]:
-    return [memo_bounds.Trials(name, 0, 0, 3) for name in ("cube", "housing", "50-gon", "gator")]
+def some_cases() -> list[Trials[str]]:
+    return [Trials(name, 0, 0, 3) for name in ("cube", "housing", "50-gon", "gator")]
 
 
 def test_shapes_of_equal_faces_have_equal_faces():
@@ -349,7 +351,7 @@ def test_a_formula_is_broken_only_by_a_mean_that_is_surely_above_it():
 
 def test_the_printed_corollary_is_broken_on_solids_and_proposition_1_is_not():
     for name in ("cube", "icosahedron", "housing", "stapler"):
-        nodes = memo_bounds.count_nodes(memo_bounds.Trials(name, 0, 0, 12)).nodes
+        nodes = memo_bounds.count_nodes(Trials(name, 0, 0, 12)).nodes
         first, corollary = memo_bounds.compare(make_shape(name), nodes)
         assert first.key == (name, "Proposition 1")
         assert first.verdict == "within"

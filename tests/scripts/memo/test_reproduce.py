@@ -30,9 +30,10 @@ from palpate.scripts.memo.coarse import SHARE, memo_left, memo_poses
 from palpate.scripts.memo.groups import count_groups, directions_of
 from palpate.scripts.memo.judge import Row, four, judge
 from palpate.scripts.memo.page import as_data, verdict, write_sections
+from palpate.scripts.memo.plan import Trials
 from palpate.scripts.memo.pool import open_plan
 from palpate.scripts.memo.section import Comparison, Section
-from palpate.scripts.memo.trial import Batch, Spec, count_stages, prepared
+from palpate.scripts.memo.trial import Spec, count_stages, prepared
 
 INCH = 0.0254
 
@@ -284,7 +285,7 @@ def test_the_memos_pose_of_exact_contacts_puts_them_on_their_faces():
 
 
 def test_the_memos_range_lets_the_right_one_pass_in_nine_trials_of_ten():
-    counts = memo_triads.run_batch(Batch(Spec("simple-hand", 10, 0.01), 0, 0, 10, "memo"))
+    counts = memo_triads.run_piece(Trials((Spec("simple-hand", 10, 0.01), "memo"), 0, 0, 10))
     trials = [trial.memo_poses for trial in counts if trial.memo_poses is not None]
     left = memo_left(trials)
     passed = [trial.misses_in[trial.right] <= left.range_in for trial in trials]
@@ -305,7 +306,7 @@ def test_a_trial_that_loses_the_right_interpretation_says_so():
 
 
 def test_no_stage_leaves_more_than_the_one_before():
-    for trial in memo_triads.run_batch(Batch(Spec("housing-34", 8, 0.05), 0, 0, 5, "test")):
+    for trial in memo_triads.run_piece(Trials((Spec("housing-34", 8, 0.05), "test"), 0, 0, 5)):
         assert trial.kept
         assert trial.pruned >= trial.tested >= trial.poses[0] >= trial.poses[1] >= 1
         assert trial.tested >= trial.shifted[0] >= trial.shifted[1] >= trial.directions >= 1
@@ -354,17 +355,17 @@ def test_the_direction_constraint_leaves_no_more_than_its_absence(sections):
 
 
 def test_adding_a_constraint_never_leaves_more():
-    batch = memo_constraints.ConstraintBatch(Spec("simple-hand", 10, 0.05), "triads", 3, 0, 3)
+    piece = Trials((Spec("simple-hand", 10, 0.05), "triads"), 3, 0, 3)
     sets = list(memo_constraints.SETS.values())
-    for trial in memo_constraints.run_batch(batch):
+    for trial in memo_constraints.run_piece(piece):
         for (fewer, a), (more, b) in itertools.permutations(zip(sets, trial.left, strict=True), 2):
             if set(fewer) < set(more):
                 assert b <= a, (fewer, more)
 
 
-def test_a_trial_does_not_depend_on_the_batch_that_it_is_in():
+def test_a_trial_does_not_depend_on_the_piece_that_it_is_in():
     def run(first: int, stop: int) -> list[Any]:
-        return memo_planar.run_batch(memo_planar.PlanarBatch("gator", 7, first, stop))
+        return memo_planar.run_piece(Trials("gator", 7, first, stop - first))
 
     assert run(0, 4) == run(0, 1) + run(1, 3) + run(3, 4)
     assert run(0, 4) != run(4, 8)

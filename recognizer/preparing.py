@@ -1,0 +1,136 @@
+"""Compiling all kernels beforehand, in processes of their own, and saying so.
+
+It happens once: when the first kernel is needed, or before, by `palpate prepare`. The processes
+that compile can be ended at any moment, as the one that waits for them can't while it compiles;
+whatever was finished is kept.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from importlib import import_module
+from pathlib import Path
+
+from .kernel_store import PREPARED, is_prepared, kernel_folder, mark, packages
+
+WORKERS = 2
+"""Processes. More would compile what others need too."""
+COMPILES_HERE = "PALPATE_COMPILES_HERE"
+"""Set in the environment of these processes, which are not to start others."""
+KERNELS = 290
+"""About as many are there, for the progress that is shown."""
+STEPS = 4
+"""Lines of progress where they can't be written over each other."""
+
+
+def announcement() -> str:
+    """What is said when kernels have to be compiled."""
+    folder = kernel_folder()
+    where = "and can keep nothing" if folder is None else f"into {folder}"
+    return f"palpate: compiling, once, for about two minutes, {where}"
+
+
+def prepare() -> bool:
+    """Compile all kernels, if that hasn't been done, with progress on stderr.
+
+    Safe with other processes at it: one compiles, the others wait. Ctrl-C ends it at once and
+    keeps what was finished.
+
+    Returns:
+        Whether there was anything to do; False too where nothing can be kept.
+
+    Raises:
+        RuntimeError: a process that compiles failed.
+    """
+    folder = kernel_folder()
+    if is_prepared() or folder is None:
+        return False
+    print(announcement(), file=sys.stderr, flush=True)
+    with _alone(folder):
+        if is_prepared():
+            return True
+        for stale in folder.parent.iterdir():
+            if stale.is_dir() and stale != folder:
+                shutil.rmtree(stale, ignore_errors=True)
+        _compile()
+        part = folder / f"{PREPARED}.{os.getpid()}"
+        part.write_text(mark(), encoding="utf-8")
+        part.replace(folder / PREPARED)
+    return True
+
+
+@contextmanager
+def _alone(folder: Path) -> Iterator[None]:
+    """Hold a lock that one process at a time has; where there are no locks, don't."""
+    try:
+        import fcntl
+    except ImportError:
+        yield
+        return
+    with open(folder / "lock", "a") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        yield
+
+
+def _compile() -> None:
+    environment = {
+        **os.environ,
+        COMPILES_HERE: "1",
+        "PYTHONPATH": os.pathsep.join(path for path in sys.path if path),
+    }
+    command = "from palpate.recognizer.preparing import compile_share; compile_share({})"
+    reading, writing = os.pipe()
+    with tempfile.TemporaryFile("w+") as errors, open(reading, encoding="utf-8") as lines:
+        workers = [
+            subprocess.Popen(
+                [sys.executable, "-P", "-c", command.format(number)],
+                env=environment,
+                stdin=subprocess.DEVNULL,
+                stdout=writing,
+                stderr=errors,
+            )
+            for number in range(WORKERS)
+        ]
+        os.close(writing)
+        try:
+            _show_progress(lines)
+            codes = [worker.wait() for worker in workers]
+        finally:
+            for worker in workers:
+                worker.kill()
+                worker.wait()
+        if any(codes):
+            errors.seek(0)
+            raise RuntimeError(f"kernels can't be compiled: {errors.read().strip()}")
+
+
+def _show_progress(lines: Iterable[str]) -> None:
+    """Count the kernels that processes say they have compiled."""
+    over = sys.stderr.isatty()
+    for done, _ in enumerate(lines, 1):
+        share = min(done / KERNELS, 1.0)
+        if over:
+            print(f"\rpalpate: compiling, {share:4.0%}", end="", file=sys.stderr, flush=True)
+        elif done % (KERNELS // STEPS) == 0:
+            print(f"palpate: compiling, {share:.0%}", file=sys.stderr, flush=True)
+    if over:
+        print("\rpalpate: compiled.      ", file=sys.stderr, flush=True)
+
+
+def tell_compiled(name: str) -> None:
+    """Say that a kernel is compiled, to the process that waits, if one does."""
+    if COMPILES_HERE in os.environ:
+        print(name, flush=True)
+
+
+def compile_share(number: int) -> None:
+    """Compile what one of the processes is to compile."""
+    parts = [part for name in packages() for part in import_module(f"palpate.{name}.warm_up").PARTS]
+    for part in parts[number::WORKERS]:
+        part()
