@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-
-import numpy as np
+from itertools import chain
 
 from ..report.markdown import Table
 from .judge import COUNTS, Four, figure, four
-from .section import Comparison, Figure, Plan, Section
-from .trial import BATCH, Spec, prepared
+from .plan import Plan, Trials, run_rows
+from .section import Comparison, Figure, Section
+from .trial import Spec, prepared
 
 TRIALS = 100
 GRID, TRIADS = "grid", "triads"
@@ -42,17 +42,6 @@ LIMIT = 100_000
 
 
 @dataclass(frozen=True)
-class ConstraintBatch:
-    """Trials of one setting, with all that another process needs to run them."""
-
-    spec: Spec
-    sensing: str
-    seed: int
-    first: int
-    stop: int
-
-
-@dataclass(frozen=True)
 class ConstraintCounts:
     """What one trial's tree leaves with each of `SETS`."""
 
@@ -66,14 +55,8 @@ class ConstraintCounts:
 def run(plan: Plan) -> Section:
     """Every set of constraints on the same contacts."""
     trials = plan.trials or TRIALS
-    work = [
-        ConstraintBatch(spec, sensing, plan.seed, first, min(first + BATCH, trials))
-        for spec, sensing in SETTINGS
-        for first in range(0, trials, BATCH)
-    ]
-    found: dict[Spec, list[ConstraintCounts]] = {spec: [] for spec, _ in SETTINGS}
-    for batch, counts in zip(work, plan.map(run_batch, work, "worth of constraints"), strict=True):
-        found[batch.spec] += counts
+    pieces = run_rows(plan, SETTINGS, trials, run_piece, "worth of constraints")
+    found = {spec: [*chain.from_iterable(counts)] for (spec, _), counts in pieces.items()}
     fours = {
         spec: {name: four([trial.left[at] for trial in trials]) for at, name in enumerate(SETS)}
         for spec, trials in found.items()
@@ -117,20 +100,20 @@ def run(plan: Plan) -> Section:
     )
 
 
-def run_batch(batch: ConstraintBatch) -> list[ConstraintCounts]:
-    """The trials of a batch."""
+def run_piece(piece: Trials[tuple[Spec, str]]) -> list[ConstraintCounts]:
+    """Some trials of a setting."""
     from ...envs.sensors.grid import sense_grid
     from ...recognizer.tree.tree import Constraints, prune
     from .triads import sense_triads
 
-    thing, counts = prepared(batch.spec.object_name), []
-    for number in range(batch.first, batch.stop):
-        rng = np.random.default_rng([batch.seed, number])
-        if batch.sensing == GRID:
+    (spec, sensing), counts = piece.row, []
+    thing = prepared(spec.object_name)
+    for rng in piece.generators():
+        if sensing == GRID:
             truth = sense_grid(thing.model, rng)
         else:
-            truth = sense_triads(batch.spec.object_name, rng)
-        contacts = truth.noisy(batch.spec.noise(), rng)
+            truth = sense_triads(spec.object_name, rng)
+        contacts = truth.noisy(spec.noise(), rng)
         left, lost, checked = [], 0, 0
         for names in SETS.values():
             switches = {name: name in names for name in ("distance", "angle", "tilt", "component")}

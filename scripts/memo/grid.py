@@ -10,9 +10,10 @@ from ...assets import memo
 from ..report.markdown import Table
 from .counts import HEADS, TRIALS, Runs, counts, loss, most_trials, printed, why_chance, why_shape
 from .judge import Row, comparison_table, figure, figures, judge
-from .section import Comparison, Figure, Plan, Section
+from .plan import Plan
+from .section import Comparison, Figure, Section
 from .transforms import table4, table6
-from .trial import Batch, Spec, Stage, TrialCounts, batches, count_stages, gather, prepared
+from .trial import Spec, Stage, Staged, TrialCounts, count_stages, prepared, run_stages
 
 NAMES = ("table2", "table3", "table4", "table6", "figure8")
 HISTOGRAM = "simple-hand"
@@ -40,8 +41,7 @@ def sections(plan: Plan, names: Sequence[str]) -> tuple[Section, ...]:
             stages[spec] = "test"
         elif "table2" in names or ("figure8" in names and spec.object_name == HISTOGRAM):
             stages[spec] = "tree"
-    work = batches(stages, plan.seed, plan.trials or TRIALS)
-    runs = gather(plan, work, run_batch, "grid sensing")
+    runs = run_stages(plan, stages, plan.trials or TRIALS, run_piece, "grid sensing")
     make = {
         "table2": _table2,
         "table3": _table3,
@@ -52,16 +52,16 @@ def sections(plan: Plan, names: Sequence[str]) -> tuple[Section, ...]:
     return tuple(make[name](runs) for name in names)
 
 
-def run_batch(batch: Batch) -> list[TrialCounts]:
-    """The trials of a batch."""
+def run_piece(piece: Staged) -> list[TrialCounts]:
+    """Some trials of a row."""
     from ...envs.sensors.grid import sense_grid
 
-    counts = []
-    for rng in batch.generators():
-        truth = sense_grid(prepared(batch.spec.object_name).model, rng)
-        contacts = truth.noisy(batch.spec.noise(), rng)
-        counts.append(count_stages(batch.spec.object_name, truth, contacts, batch.stage))
-    return counts
+    (spec, stage), counted = piece.row, []
+    for rng in piece.generators():
+        truth = sense_grid(prepared(spec.object_name).model, rng)
+        contacts = truth.noisy(spec.noise(), rng)
+        counted.append(count_stages(spec.object_name, truth, contacts, stage))
+    return counted
 
 
 def _table2(runs: Runs) -> Section:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,8 +13,9 @@ from numpy.typing import NDArray
 from ...assets import memo
 from ..report.markdown import Table
 from .judge import COUNTS, Row, figures, four, judge
-from .section import Comparison, Figure, Plan, Section
-from .trial import BATCH, Spec, prepared
+from .plan import Plan, Trials, run_rows
+from .section import Comparison, Figure, Section
+from .trial import Spec, prepared
 
 if TYPE_CHECKING:
     from ...recognizer import Contacts, PairTables
@@ -37,15 +39,6 @@ WHY_SPEC = (
 
 
 @dataclass(frozen=True)
-class LevelBatch:
-    """Trials, with all that another process needs to run them."""
-
-    seed: int
-    first: int
-    stop: int
-
-
-@dataclass(frozen=True)
 class LevelCounts:
     """Interpretations at each level of one trial's tree, for each of `ORDERS`."""
 
@@ -57,11 +50,8 @@ class LevelCounts:
 def sections(plan: Plan, names: Sequence[str]) -> tuple[Section, ...]:
     """Run both orders, whichever of `NAMES` are asked for: they share their contacts."""
     trials = plan.trials or TRIALS
-    work = [
-        LevelBatch(plan.seed, first, min(first + BATCH, trials))
-        for first in range(0, trials, BATCH)
-    ]
-    found = [trial for batch in plan.map(run_batch, work, "levels of the tree") for trial in batch]
+    pieces = run_rows(plan, [SPEC], trials, run_piece, "levels of the tree")
+    found = [*chain.from_iterable(pieces[SPEC])]
     levels = {
         order: np.array([trial.by_order[at] for trial in found]) for at, order in enumerate(ORDERS)
     }
@@ -70,17 +60,17 @@ def sections(plan: Plan, names: Sequence[str]) -> tuple[Section, ...]:
     return tuple(make[name](levels, len(found), lost) for name in names)
 
 
-def run_batch(batch: LevelBatch) -> list[LevelCounts]:
-    """The trials of a batch."""
+def run_piece(piece: Trials[Spec]) -> list[LevelCounts]:
+    """Some trials."""
     from ...envs.sensors.grid import sense_grid
     from ...recognizer.tree.tree import far_apart_order
 
-    thing = prepared(SPEC.object_name)
+    spec = piece.row
+    thing = prepared(spec.object_name)
     counts = []
-    for number in range(batch.first, batch.stop):
-        rng = np.random.default_rng([batch.seed, number])
+    for rng in piece.generators():
         truth = sense_grid(thing.model, rng, CONTACTS, CONTACTS)
-        contacts = truth.noisy(SPEC.noise(), rng)
+        contacts = truth.noisy(spec.noise(), rng)
         orders = {
             "random": rng.permutation(CONTACTS),
             "pairs": by_pairs(contacts.positions),

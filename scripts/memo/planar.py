@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
+from itertools import chain
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,8 +14,8 @@ from numpy.typing import NDArray
 from ...assets import memo
 from ..report.markdown import Table
 from .judge import FACTOR, figure, four
-from .section import Comparison, Figure, Plan, Section
-from .trial import BATCH
+from .plan import Plan, Trials, run_rows
+from .section import Comparison, Figure, Section
 
 if TYPE_CHECKING:
     from ...recognizer import Contacts, Polygon
@@ -27,16 +28,6 @@ POSITION_ERROR_IN = 0.1
 NORMAL_ERROR = np.pi / 8
 ONES, TENS = 10, 100
 """Counts up to the first have a bin each, up to the second one for ten."""
-
-
-@dataclass(frozen=True)
-class PlanarBatch:
-    """Runs with one object."""
-
-    object_name: str
-    seed: int
-    first: int
-    stop: int
 
 
 @dataclass(frozen=True)
@@ -54,14 +45,8 @@ def run(plan: Plan) -> Section:
     printed = memo.table1()
     names = list(dict.fromkeys(row.object_name for row in printed))
     runs = plan.trials or RUNS
-    work = [
-        PlanarBatch(name, plan.seed, first, min(first + BATCH, runs))
-        for name in names
-        for first in range(0, runs, BATCH)
-    ]
-    found: dict[str, list[PlanarCounts]] = {name: [] for name in names}
-    for batch, counts in zip(work, plan.map(run_batch, work, "planar objects"), strict=True):
-        found[batch.object_name] += counts
+    pieces = run_rows(plan, names, runs, run_piece, "planar objects")
+    found = {name: [*chain.from_iterable(counts)] for name, counts in pieces.items()}
     ours = {
         (row.object_name, row.direction): [
             run.with_direction if row.direction else run.without for run in found[row.object_name]
@@ -106,15 +91,15 @@ def run(plan: Plan) -> Section:
     )
 
 
-def run_batch(batch: PlanarBatch) -> list[PlanarCounts]:
-    """The runs of a batch."""
+def run_piece(piece: Trials[str]) -> list[PlanarCounts]:
+    """Some runs with an object."""
     from ...recognizer import Constraints
     from ...recognizer.tree.tree import prune
 
-    model, tables = _prepared(batch.object_name)
+    model, tables = _prepared(piece.row)
     counts = []
-    for number in range(batch.first, batch.stop):
-        contacts, edges = _sense(model, np.random.default_rng([batch.seed, number]))
+    for rng in piece.generators():
+        contacts, edges = _sense(model, rng)
         strong = prune(tables, contacts).faces
         weak = prune(tables, contacts, constraints=Constraints(component=False)).faces
         kept = all(bool((left == edges).all(axis=1).any()) for left in (strong, weak))

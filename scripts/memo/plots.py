@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import io
-from collections.abc import Callable, Mapping, Sequence
-from functools import wraps
-from typing import TYPE_CHECKING, Literal, ParamSpec
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from ..report.plots import COLOURS, STYLE
+from ..report.drawing import COLOURS, FAINT, in_style, panels_of, svg_of
 from .judge import MEDIAN, Row
 
 if TYPE_CHECKING:
@@ -18,28 +16,11 @@ if TYPE_CHECKING:
     from matplotlib.ticker import Locator
 
 OURS, MEMO = COLOURS[0], COLOURS[1]
-FAINT = "#ececec"
 MANY_BINS = 12
 FEWEST_TIMES = 8.0
 """Ends of a logarithmic axis of counts are in about this ratio at least."""
 NARROW = 300.0
 """Ends of a logarithmic axis in a smaller ratio: it gets figures between decades."""
-
-P = ParamSpec("P")
-
-
-def in_style(draw: Callable[P, str]) -> Callable[P, str]:
-    """Have a drawing made in the reports' style."""
-
-    @wraps(draw)
-    def styled(*args: P.args, **named: P.kwargs) -> str:
-        import matplotlib as mpl
-
-        mpl.use("Agg", force=False)
-        with mpl.rc_context(STYLE):
-            return draw(*args, **named)
-
-    return styled
 
 
 @in_style
@@ -169,45 +150,6 @@ def draw_bars(
         panel.set_xlim(left=1.0)
         _logarithmic(panel, "x")
     return svg_of(figure)
-
-
-def panels_of(
-    count: int, size: tuple[float, float], *, most_columns: int = 4, sharey: bool = False
-) -> tuple[Figure, list[Axes]]:
-    """As many panels as are asked for, in rows, in the reports' style.
-
-    Args:
-        count: how many.
-        size: width and height of a panel, inches.
-        most_columns: the most beside one another.
-        sharey: whether they have one vertical axis.
-    """
-    import matplotlib.pyplot as plt
-
-    columns = min(count, most_columns)
-    rows = -(-count // columns)
-    figure, grid = plt.subplots(
-        rows,
-        columns,
-        figsize=(size[0] * columns, size[1] * rows + 0.4),
-        squeeze=False,
-        sharey=sharey,
-        layout="constrained",
-    )
-    panels = list(grid.flat)
-    for unused in panels[count:]:
-        unused.set_axis_off()
-    return figure, panels[:count]
-
-
-def svg_of(figure: Figure) -> str:
-    """A figure as SVG, the same each time it is drawn; it is closed."""
-    import matplotlib.pyplot as plt
-
-    sink = io.BytesIO()
-    figure.savefig(sink, format="svg", metadata={"Date": None}, bbox_inches="tight")
-    plt.close(figure)
-    return sink.getvalue().decode()
 
 
 def _whole_numbers() -> Locator:

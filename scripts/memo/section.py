@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal, Protocol, TypeVar
+from typing import Literal
 
 from ..report.markdown import Table
-
-Case = TypeVar("Case")
-Result = TypeVar("Result")
+from .plan import Plan
 
 
 @dataclass(frozen=True)
@@ -57,24 +55,6 @@ class Section:
     """Trials in which it was looked whether the right interpretation was kept."""
     lost: int
     """Those of them that discarded it."""
-
-
-class Plan(Protocol):
-    """How an experiment is to be run."""
-
-    trials: int | None
-    """Trials a row; None for as many as the memo ran."""
-    seed: int
-
-    def map(
-        self, function: Callable[[Case], Result], cases: Sequence[Case], label: str
-    ) -> Iterable[Result]:
-        """Results in the order of the cases, on the processes there are, with progress shown.
-
-        The function is one of a module, so that other processes find it. A case holds what it
-        needs, its own seed too, so that results don't depend on the number of processes.
-        """
-        ...
 
 
 Experiment = Callable[[Plan], Section]

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...assets.memo import place, table2, timing
+from ..report.drawing import COLOURS, FAINT, in_style, panels_of, svg_of
 from ..report.markdown import Table
-from ..report.plots import COLOURS
-from .plots import in_style, svg_of
-from .section import Comparison, Figure, Plan, Section
-from .timing_trials import COUNTED, KEPT, PRUNED, RECOGNIZED, TESTED, Trials, measure_times
+from .plan import Plan, run_rows
+from .section import Comparison, Figure, Section
+from .timing_trials import COUNTED, KEPT, PRUNED, RECOGNIZED, TESTED, measure_times
+from .trial import Spec
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -23,8 +25,6 @@ Floats = NDArray[np.float64]
 
 TRIALS = 100
 """As many as the memo ran in its simulations; of its timing it doesn't say."""
-CHUNK = 10
-"""Trials that a process does in one go."""
 MEANT = (15, 10)
 """Bounds on normals, pi over these, that the memo may have meant by the one it prints."""
 NAMES = ("prune, s", "all tests, s", "a test, s")
@@ -33,47 +33,27 @@ NAMES = ("prune, s", "all tests, s", "a test, s")
 def run(plan: Plan) -> Section:
     """Time the housing at the memo's bounds, and at all bounds of its Table II."""
     memo, trials = timing(), plan.trials or TRIALS
-    here = [(pi_over, memo.position_error_in) for pi_over in (memo.pi_over, *MEANT)]
-    table = [
-        (row.pi_over, row.position_error_in)
-        for row in table2()
-        if row.object_name == memo.object_name
-    ]
-    bounds = [*here, *(bound for bound in table if bound not in here)]
-    cases = [
-        Trials(*bound, plan.seed, first, min(CHUNK, trials - first))
-        for bound in bounds
-        for first in range(0, trials, CHUNK)
-    ]
-    times = list(plan.map(measure_times, cases, "running times"))
-    joined = {
-        bound: np.concatenate(
-            [
-                time.rows
-                for case, time in zip(cases, times, strict=True)
-                if (case.pi_over, case.inches) == bound
-            ]
-        )
-        for bound in bounds
-    }
+    here = [replace(Spec.of(memo), pi_over=pi_over) for pi_over in (memo.pi_over, *MEANT)]
+    table = [Spec.of(row) for row in table2() if row.object_name == memo.object_name]
+    specs = dict.fromkeys([*here, *table])
+    found = run_rows(plan, specs, trials, measure_times, "running times")
+    joined = {spec: np.concatenate([one.rows for one in found[spec]]) for spec in specs}
     return _section(
-        {bound: joined[bound] for bound in here},
-        np.concatenate([joined[bound] for bound in table]),
-        checked=trials * len(bounds),
-        lost=sum(time.lost for time in times),
+        {spec: joined[spec] for spec in here},
+        np.concatenate([joined[spec] for spec in table]),
+        checked=trials * len(specs),
+        lost=sum(one.lost for pieces in found.values() for one in pieces),
     )
 
 
-def _section(
-    here: Mapping[tuple[int, float], Floats], table: Floats, *, checked: int, lost: int
-) -> Section:
+def _section(here: Mapping[Spec, Floats], table: Floats, *, checked: int, lost: int) -> Section:
     memo = timing()
     printed = memo.prune_seconds, memo.test_seconds, memo.seconds_a_test
     tests = memo.test_seconds / memo.seconds_a_test
     first, *_ = (_means(rows) for rows in here.values())
     slopes = [growth(table, column) for column in (PRUNED, TESTED)]
     compared = Comparison(
-        key=_label(memo.pi_over, memo.position_error_in),
+        key=Spec.of(memo).key,
         names=NAMES,
         memo=printed,
         ours=first,
@@ -159,26 +139,22 @@ def _means(rows: Floats) -> tuple[float, float, float]:
     )
 
 
-def _label(pi_over: int, inches: float) -> tuple[str, str, str]:
-    return timing().object_name, f"π/{pi_over}", f"{inches:g} in"
-
-
 def _times(factor: float) -> str:
     """A factor to two digits, with separators."""
     digits = 1 - math.floor(math.log10(factor))
     return f"{round(factor, digits):,.0f}"
 
 
-def _counts(here: Mapping[tuple[int, float], Floats], tests: float) -> str:
+def _counts(here: Mapping[Spec, Floats], tests: float) -> str:
     """How many tests a trial takes here, and which bound comes nearest to the memo's number."""
-    counts = {pi_over: rows[:, COUNTED].mean() for (pi_over, _), rows in here.items()}
+    counts = {spec.pi_over: rows[:, COUNTED].mean() for spec, rows in here.items()}
     nearest = min(counts, key=lambda pi_over: abs(math.log(counts[pi_over] / tests)))
     shown = ", ".join(f"{count:.0f} at π/{pi_over}" for pi_over, count in counts.items())
     likelier = f", so what was timed may have been π/{nearest}"
     return f"here there are {shown}{likelier if nearest != timing().pi_over else ''}."
 
 
-def _table(here: Mapping[tuple[int, float], Floats]) -> Table:
+def _table(here: Mapping[Spec, Floats]) -> Table:
     memo = timing()
     tests = memo.test_seconds / memo.seconds_a_test
     printed = [
@@ -191,11 +167,11 @@ def _table(here: Mapping[tuple[int, float], Floats]) -> Table:
         "",
     ]
     rows = [printed]
-    for (pi_over, inches), values in here.items():
+    for spec, values in here.items():
         prune_seconds, test_seconds, a_test = _means(values)
         rows.append(
             [
-                ", ".join(_label(pi_over, inches)),
+                ", ".join(spec.key),
                 f"{values[:, COUNTED].mean():.1f}",
                 f"{values[:, KEPT].mean():.1f}",
                 f"{1e3 * prune_seconds:.2f}",
@@ -211,9 +187,7 @@ def _table(here: Mapping[tuple[int, float], Floats]) -> Table:
 @in_style
 def draw_growth(rows: Floats) -> str:
     """Time to prune and to test against the number of interpretations."""
-    import matplotlib.pyplot as plt
-
-    figure, panels = plt.subplots(1, 2, figsize=(6.5, 2.6), sharey=True, layout="constrained")
+    figure, panels = panels_of(2, (3.25, 2.2), sharey=True)
     titles: Sequence[tuple[Axes, int, str]] = (
         (panels[0], PRUNED, "to prune"),
         (panels[1], TESTED, "to test all of them"),
@@ -236,7 +210,7 @@ def draw_growth(rows: Floats) -> str:
             title = f"{title}: power {slope:.2f}"
         panel.set(title=title, xscale="log", yscale="log", xlabel="interpretations")
         panel.xaxis.set_major_formatter("{x:g}")
-        panel.grid(color="#ececec", linewidth=0.6)
+        panel.grid(color=FAINT, linewidth=0.6)
     panels[0].set_ylabel("ms")
     panels[0].yaxis.set_major_formatter("{x:g}")
     return svg_of(figure)

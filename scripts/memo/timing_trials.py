@@ -9,13 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...assets.memo import timing
-from ...envs.library import load_library
 from ...envs.sensors.grid import sense_grid
-from ...recognizer import PairTables, Polyhedron, Recognizer
-from ...recognizer.poses.fits.pose import ModelTest
+from ...recognizer import Recognizer
 from ...recognizer.tree.tree import prune
 from ..timed import timed
-from .noise import noise_of
+from .plan import Trials
+from .trial import Spec, prepared
 
 Floats = NDArray[np.float64]
 
@@ -25,17 +24,6 @@ COLUMNS = 5
 COUNTED, PRUNED, TESTED, KEPT, RECOGNIZED = range(COLUMNS)
 """Of a trial: interpretations that the tree leaves; seconds to prune and to test; interpretations
 that the tests leave; seconds of the recogniser, which does both at once."""
-
-
-@dataclass(frozen=True)
-class Trials:
-    """Some trials at one pair of bounds."""
-
-    pi_over: int
-    inches: float
-    seed: int
-    first: int
-    count: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,44 +36,34 @@ class Times:
     """Trials in which the tree or the model test dropped the right interpretation."""
 
 
-def measure_times(case: Trials) -> Times:
+def measure_times(piece: Trials[Spec]) -> Times:
     """Prune, test and recognise some trials, by the processor's clock."""
-    prepared = _prepared()
-    rows = np.empty((case.count, COLUMNS))
-    lost = 0
-    for number in range(case.count):
-        rng = np.random.default_rng([case.seed, case.first + number])
-        rows[number], kept = prepared.measure(case.pi_over, case.inches, rng)
-        lost += not kept
-    return Times(rows, lost)
+    _warm_up()
+    measured = [_measure(piece.row, rng) for rng in piece.generators()]
+    rows = np.array([row for row, _ in measured])
+    return Times(rows, sum(not kept for _, kept in measured))
 
 
-@dataclass(frozen=True, eq=False)
-class Prepared:
-    """The object with all that is built of it once."""
-
-    model: Polyhedron
-    tables: PairTables
-    test: ModelTest
-    recognizer: Recognizer
-
-    def measure(self, pi_over: int, inches: float, rng: np.random.Generator) -> tuple[Floats, bool]:
-        """Times of a trial, see `Times`, and whether the right interpretation was kept."""
-        truth = sense_grid(self.model, rng)
-        contacts = truth.noisy(noise_of(pi_over, inches), rng)
-        pruned, prune_seconds = timed(prune, self.tables, contacts)
-        poses, test_seconds = timed(self.test.run, pruned.faces, contacts)
-        _, seconds = timed(self.recognizer.recognize, contacts)
-        kept = bool((poses.faces == truth.faces).all(axis=1).any())
-        counts = len(pruned.faces), len(poses)
-        return np.array([counts[0], prune_seconds, test_seconds, counts[1], seconds]), kept
+def _measure(spec: Spec, rng: np.random.Generator) -> tuple[Floats, bool]:
+    """Times of a trial, see `Times`, and whether the right interpretation was kept."""
+    thing = prepared(spec.object_name)
+    truth = sense_grid(thing.model, rng)
+    contacts = truth.noisy(spec.noise(), rng)
+    pruned, prune_seconds = timed(prune, thing.tables, contacts)
+    poses, test_seconds = timed(thing.test.run, pruned.faces, contacts)
+    _, seconds = timed(_recognizer(spec.object_name).recognize, contacts)
+    kept = bool((poses.faces == truth.faces).all(axis=1).any())
+    counts = len(pruned.faces), len(poses)
+    return np.array([counts[0], prune_seconds, test_seconds, counts[1], seconds]), kept
 
 
 @cache
-def _prepared() -> Prepared:
-    memo = timing()
-    (model,) = load_library([memo.object_name])
-    prepared = Prepared(model, PairTables.of(model), ModelTest(model), Recognizer([model]))
+def _recognizer(object_name: str) -> Recognizer:
+    return Recognizer([prepared(object_name).model])
+
+
+@cache
+def _warm_up() -> None:
+    """Let what happens once a process happen outside the clock."""
     for number in range(WARM_UP):
-        prepared.measure(memo.pi_over, memo.position_error_in, np.random.default_rng(number))
-    return prepared
+        _measure(Spec.of(timing()), np.random.default_rng(number))

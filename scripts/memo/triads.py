@@ -22,8 +22,9 @@ from .counts import (
     why_shape,
 )
 from .judge import Four, Row, comparison_table, figure, figures, four, judge
-from .section import Figure, Plan, Section
-from .trial import Batch, Spec, Stage, TrialCounts, batches, count_stages, gather, prepared
+from .plan import Plan
+from .section import Figure, Section
+from .trial import Spec, Stage, Staged, TrialCounts, count_stages, prepared, run_stages
 
 if TYPE_CHECKING:
     from ...envs.sensors.grid import TrueContacts
@@ -42,8 +43,8 @@ SENSED = (
 def sections(plan: Plan, names: Sequence[str]) -> tuple[Section, ...]:
     """Run what the named ones of `NAMES` need, once for all of them."""
     stage: Stage = "tree" if set(names) == {"table7"} else "memo"
-    work = batches({Spec.of(row): stage for row in memo.table7()}, plan.seed, plan.trials or TRIALS)
-    runs = gather(plan, work, run_batch, "triad sensing")
+    stages: dict[Spec, Stage] = dict.fromkeys(map(Spec.of, memo.table7()), stage)
+    runs = run_stages(plan, stages, plan.trials or TRIALS, run_piece, "triad sensing")
     left = {}
     if stage == "memo":
         left = {
@@ -58,13 +59,13 @@ def sections(plan: Plan, names: Sequence[str]) -> tuple[Section, ...]:
     return tuple(made[name]() for name in names)
 
 
-def run_batch(batch: Batch) -> list[TrialCounts]:
-    """The trials of a batch."""
-    counted = []
-    for rng in batch.generators():
-        truth = sense_triads(batch.spec.object_name, rng)
-        contacts = truth.noisy(batch.spec.noise(), rng)
-        counted.append(count_stages(batch.spec.object_name, truth, contacts, batch.stage))
+def run_piece(piece: Staged) -> list[TrialCounts]:
+    """Some trials of a row."""
+    (spec, stage), counted = piece.row, []
+    for rng in piece.generators():
+        truth = sense_triads(spec.object_name, rng)
+        contacts = truth.noisy(spec.noise(), rng)
+        counted.append(count_stages(spec.object_name, truth, contacts, stage))
     return counted
 
 

@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
+from itertools import chain
 from typing import TYPE_CHECKING, Literal
-
-import numpy as np
 
 from ...assets import memo
 from .coarse import MemoPoses, memo_poses
 from .groups import count_transforms
+from .plan import Plan, Trials, run_rows
 
 if TYPE_CHECKING:
     from ...envs.sensors.grid import TrueContacts
     from ...envs.sensors.noise import SensorNoise
     from ...recognizer import Contacts, PairTables, Polyhedron
     from ...recognizer.poses.fits.pose import ModelTest
-    from .section import Plan
-
-BATCH = 10
-"""Trials that a process is given at a time."""
 
 Stage = Literal["tree", "test", "memo"]
 """How far to go: the tree alone, the model test and transforms too, the memo's own test besides."""
@@ -38,7 +34,7 @@ class Spec:
     """The bound on positions, inches."""
 
     @classmethod
-    def of(cls, row: memo.CountRow | memo.ClusterRow) -> Spec:
+    def of(cls, row: memo.CountRow | memo.ClusterRow | memo.PoseErrorRow | memo.Timing) -> Spec:
         """What a row of the memo's is about."""
         return cls(row.object_name, row.pi_over, row.position_error_in)
 
@@ -59,19 +55,8 @@ class Spec:
         return noise_of(self.pi_over, self.position_error_in)
 
 
-@dataclass(frozen=True)
-class Batch:
-    """Trials of one row, with all that another process needs to run them."""
-
-    spec: Spec
-    seed: int
-    first: int
-    stop: int
-    stage: Stage
-
-    def generators(self) -> list[np.random.Generator]:
-        """One a trial. Every row sees the same cases, so that rows differ by their noise alone."""
-        return [np.random.default_rng([self.seed, trial]) for trial in range(self.first, self.stop)]
+Staged = Trials[tuple[Spec, Stage]]
+"""Trials of a row, and how far to go."""
 
 
 @dataclass(frozen=True)
@@ -117,26 +102,16 @@ def prepared(object_name: str) -> Prepared:
     return Prepared(model, PairTables.of(model), ModelTest(model))
 
 
-def batches(stages: Mapping[Spec, Stage], seed: int, trials: int) -> list[Batch]:
-    """All trials of all rows, in order; each row as far as it is to go."""
-    return [
-        Batch(spec, seed, first, min(first + BATCH, trials), stage)
-        for spec, stage in stages.items()
-        for first in range(0, trials, BATCH)
-    ]
-
-
-def gather(
+def run_stages(
     plan: Plan,
-    work: Sequence[Batch],
-    run: Callable[[Batch], list[TrialCounts]],
+    stages: Mapping[Spec, Stage],
+    trials: int,
+    run: Callable[[Staged], list[TrialCounts]],
     label: str,
 ) -> dict[Spec, list[TrialCounts]]:
-    """Run batches; the trials of each row."""
-    runs: dict[Spec, list[TrialCounts]] = {batch.spec: [] for batch in work}
-    for batch, counts in zip(work, plan.map(run, work, label), strict=True):
-        runs[batch.spec] += counts
-    return runs
+    """The trials of each row, each as far as it is to go."""
+    found = run_rows(plan, stages.items(), trials, run, label)
+    return {spec: [*chain.from_iterable(pieces)] for (spec, _), pieces in found.items()}
 
 
 def count_stages(

@@ -8,16 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...report.markdown import Table, items
-from ..section import Comparison, Figure, Plan, Section
-from .counts import COUNTERS, LEVELS, NOISE, SHAPES, Counts, Shape, Trials, count_nodes, make_shape
+from ..plan import Plan, run_rows
+from ..section import Comparison, Figure, Section
+from .counts import COUNTERS, LEVELS, NOISE, SHAPES, Shape, count_nodes, make_shape
 from .plots import draw_nodes
 
 Floats = NDArray[np.float64]
 
 TRIALS = 100
 """The memo counted none; as many as in its simulations."""
-CHUNK = 10
-"""Trials that a process does in one go."""
 SURE = 2.0
 """Standard errors by which a mean must be above a formula to count as above it."""
 JUDGED = {
@@ -34,19 +33,9 @@ BROKEN, BROKEN_CHAIN = "×", "(×)"
 def run(plan: Plan) -> Section:
     """Count nodes on solids, stand-ins and outlines, beside the formulas."""
     trials = plan.trials or TRIALS
-    cases = [
-        Trials(shape, plan.seed, first, min(CHUNK, trials - first))
-        for shape in SHAPES
-        for first in range(0, trials, CHUNK)
-    ]
-    counts = list(plan.map(count_nodes, cases, "nodes a level"))
-    nodes = {
-        shape: np.concatenate(
-            [one.nodes for case, one in zip(cases, counts, strict=True) if case.shape == shape]
-        )
-        for shape in SHAPES
-    }
-    return _section(nodes, counts, trials)
+    found = run_rows(plan, SHAPES, trials, count_nodes, "nodes a level")
+    nodes = {name: np.concatenate([one.nodes for one in found[name]]) for name in SHAPES}
+    return _section(nodes, trials, sum(one.lost for pieces in found.values() for one in pieces))
 
 
 def exceeds(counted: Floats, formula: Floats) -> NDArray[np.bool_]:
@@ -57,7 +46,7 @@ def exceeds(counted: Floats, formula: Floats) -> NDArray[np.bool_]:
         return means - SURE * spread / np.sqrt(len(counted)) > formula * (1.0 + 1e-9)
 
 
-def _section(nodes: Mapping[str, Floats], counts: Sequence[Counts], trials: int) -> Section:
+def _section(nodes: Mapping[str, Floats], trials: int, lost: int) -> Section:
     compared = tuple(
         comparison for name in SHAPES for comparison in compare(make_shape(name), nodes[name])
     )
@@ -105,7 +94,7 @@ def _section(nodes: Mapping[str, Floats], counts: Sequence[Counts], trials: int)
         ),
         comparisons=compared,
         checked=trials * len(SHAPES),
-        lost=sum(one.lost for one in counts),
+        lost=lost,
     )
 
 

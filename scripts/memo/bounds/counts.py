@@ -15,10 +15,11 @@ from ....envs.library import load_library
 from ....envs.planar.library import load_outlines
 from ....envs.probe_env import INCH
 from ....envs.sensors.grid import sense_grid
-from ....envs.sensors.noise import SensorNoise
 from ....recognizer import Contacts, PairTables, Polygon, Polyhedron
 from ....recognizer.tables.planar_ranges import PlanarTables
 from ....recognizer.tree.tree import prune
+from ..noise import noise_of
+from ..plan import Trials
 from . import formulas as bounds
 
 Floats = NDArray[np.float64]
@@ -30,7 +31,7 @@ MOST_FACES = 100
 """The trees of objects of more are counted to level 3 alone: the work grows with n^4."""
 DIAMETER = 4.0
 """Of the solids and outlines made here, inches: the housing's."""
-NOISE = SensorNoise(position_error=0.01 * INCH, normal_error=np.pi / 10.0)
+NOISE = noise_of(10, 0.01)
 
 SOLIDS = ("cube", "icosahedron", "sphere")
 OUTLINES = ("12-gon", "50-gon")
@@ -87,16 +88,6 @@ class Shape:
         return {name: np.array(values) for name, values in found.items()}
 
 
-@dataclass(frozen=True)
-class Trials:
-    """Some trials of an object."""
-
-    shape: str
-    seed: int
-    first: int
-    count: int
-
-
 @dataclass(frozen=True, eq=False)
 class Counts:
     """What was counted in some trials."""
@@ -108,12 +99,12 @@ class Counts:
     """Trials in which some counter dropped the right interpretation."""
 
 
-def count_nodes(case: Trials) -> Counts:
+def count_nodes(piece: Trials[str]) -> Counts:
     """Touch an object, contacts in random order, and count what fits."""
-    shape = make_shape(case.shape)
-    nodes, lost = np.empty((case.count, len(COUNTERS), LEVELS)), 0
-    for row in range(case.count):
-        rng = np.random.default_rng([case.seed, SHAPES.index(case.shape), case.first + row])
+    shape = make_shape(piece.row)
+    nodes, lost = np.empty((piece.count, len(COUNTERS), LEVELS)), 0
+    for row, number in enumerate(piece.numbers):
+        rng = np.random.default_rng([piece.seed, SHAPES.index(piece.row), number])
         contacts, faces = _touch(shape.model, rng)
         nodes[row], kept = _count(shape, contacts, faces)
         lost += not kept

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ...report.plots import COLOURS
-from ..plots import in_style, svg_of
+from ...report.drawing import COLOURS, COLUMNS, FAINT, in_style, panels_of, svg_of
 from .counts import COUNTERS, LEVELS, SHAPES, Shape, make_shape
 
 if TYPE_CHECKING:
@@ -40,26 +39,17 @@ def draw_nodes(nodes: Mapping[str, Floats]) -> str:
     Returns:
         The drawing as SVG.
     """
-    import matplotlib.pyplot as plt
-
-    columns = 4
     # One panel more, for the legend.
-    rows = -(-(len(SHAPES) + 1) // columns)
-    figure, grid = plt.subplots(
-        rows, columns, figsize=(2.4 * columns, 2.1 * rows), sharex=True, layout="constrained"
-    )
-    panels = list(grid.flat)
-    for panel, name in zip(panels, SHAPES, strict=False):
+    figure, (*panels, legend) = panels_of(len(SHAPES) + 1, (2.4, 2.1))
+    for panel, name in zip(panels, SHAPES, strict=True):
         _draw_object(panel, make_shape(name), nodes[name])
-    for panel in panels[::columns]:
+    for panel in panels[::COLUMNS]:
         panel.set_ylabel("interpretations")
-    for panel in panels[len(SHAPES) - columns : len(SHAPES)]:
+    for panel in panels[-COLUMNS:]:
         panel.set_xlabel("level")
-        panel.tick_params(labelbottom=True)
-    for unused in panels[len(SHAPES) :]:
-        unused.set_axis_off()
+    legend.set_axis_off()
     handles, labels = panels[0].get_legend_handles_labels()
-    panels[len(SHAPES)].legend(handles, labels, loc="upper left", frameon=False)
+    legend.legend(handles, labels, loc="upper left", frameon=False)
     return svg_of(figure)
 
 
@@ -75,4 +65,4 @@ def _draw_object(panel: Axes, shape: Shape, counted: Floats) -> None:
         )
     panel.set(title=f"{shape.model.name}: {shape.described}", yscale="log")
     panel.set_xticks(levels)
-    panel.grid(color="#ececec", linewidth=0.6)
+    panel.grid(color=FAINT, linewidth=0.6)

@@ -8,27 +8,19 @@ import numpy as np
 
 from ....assets.memo import PoseErrorRow, place, table5
 from ...report.markdown import Table, items
-from ..section import Comparison, Figure, Plan, Section
-from .judge import COLUMNS, FACTOR, NAMES, SURE, TRIALS, given, judge, label, means, printed
+from ..plan import Plan, run_rows
+from ..section import Comparison, Figure, Section
+from ..trial import Spec
+from .judge import COLUMNS, FACTOR, NAMES, SURE, TRIALS, given, judge, means, printed
 from .plots import draw_means, draw_singularity
-from .trials import METHODS, TRANSLATION, WHOLE, Errors, Trials, measure_errors
-
-CHUNK = 10
-"""Trials that a process does in one go."""
+from .trials import METHODS, TRANSLATION, WHOLE, Errors, measure_errors
 
 
 def run(plan: Plan) -> Section:
     """Rerun Table V."""
     rows, trials = table5(), plan.trials or TRIALS
-    chunks = [(first, min(CHUNK, trials - first)) for first in range(0, trials, CHUNK)]
-    cases = [
-        Trials(row.object_name, row.pi_over, row.position_error_in, plan.seed, *chunk)
-        for row in rows
-        for chunk in chunks
-    ]
-    found = list(plan.map(measure_errors, cases, "Table V"))
-    of_row = [found[start : start + len(chunks)] for start in range(0, len(found), len(chunks))]
-    return _section(rows, [Errors.join(parts) for parts in of_row], trials)
+    found = run_rows(plan, map(Spec.of, rows), trials, measure_errors, "Table V")
+    return _section(rows, [Errors.join(pieces) for pieces in found.values()], trials)
 
 
 def _section(rows: Sequence[PoseErrorRow], errors: Sequence[Errors], trials: int) -> Section:
@@ -128,7 +120,7 @@ def _table(
         cells, unsure = [], "" if row.sure else "?"
         for there, a, b, digits in zip(printed(row), method, joint, (2, 2, 3), strict=True):
             cells += [f"{there:.2f}{unsure}", f"{a:.{digits}f}", f"{b:.{digits}f}"]
-        shown.append([", ".join(label(row)), *cells, judged.verdict])
+        shown.append([", ".join(Spec.of(row).key), *cells, judged.verdict])
     heads = ["object, normal, dist"]
     heads += [f"{name}: {who}" for name in NAMES for who in ("memo", "its method", "joint fit")]
     return Table([*heads, "verdict"], shown)
@@ -145,5 +137,5 @@ def _rotation_table(rows: Sequence[PoseErrorRow], errors: Sequence[Errors]) -> T
             whole = given(error.by_method[name])[:, WHOLE]
             figures = (whole.mean(), np.median(whole), whole.max()) if len(whole) else ()
             cells += [f"{figure:.2f}" for figure in figures] or [""] * 3
-        shown.append([", ".join(label(row)), *cells])
+        shown.append([", ".join(Spec.of(row).key), *cells])
     return Table(heads, shown)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ....assets.memo import PoseErrorRow
 from ..section import Comparison
+from ..trial import Spec
 from .trials import ANGLE, DIRECTION, METHODS, TRANSLATION, Errors
 
 Floats = NDArray[np.float64]
@@ -25,11 +26,6 @@ COLUMNS = (DIRECTION, ANGLE, TRANSLATION)
 """What the memo prints."""
 DAMAGED = "the transcript of this row is damaged: its figures may be another row's"
 STAND_INS = "the shape and its origin are a stand-in's, and the memo leaves open how it clusters"
-
-
-def label(row: PoseErrorRow) -> tuple[str, str, str]:
-    """What a row is about."""
-    return row.object_name, f"π/{row.pi_over}", f"{row.position_error_in:.2f} in"
 
 
 def printed(row: PoseErrorRow) -> tuple[float, float, float]:
@@ -77,7 +73,7 @@ def judge(rows: Sequence[PoseErrorRow], errors: Sequence[Errors]) -> tuple[Compa
             why, verdict = DAMAGED, "not judged"
         elif not (faults or disorder):
             why, verdict = "", "within"
-        compared.append(Comparison(label(row), NAMES, printed(row), ours, verdict, why))
+        compared.append(Comparison(Spec.of(row).key, NAMES, printed(row), ours, verdict, why))
     return tuple(compared)
 
 
@@ -100,14 +96,14 @@ def misplaced(rows: Sequence[PoseErrorRow], method: Sequence[Floats]) -> list[li
         for name, column, step in zip(NAMES, COLUMNS, there, strict=True):
             ordered = abs(here[column]) > scatter[column] and abs(step) > of_memo[column]
             if ordered and here[column] * step < 0.0:
-                other = ", ".join(label(rows[a])[1:])
+                other = ", ".join(Spec.of(rows[a]).key[1:])
                 faults[b].append(f"{name}: ordered the other way against {other}")
     return faults
 
 
 def neighbours(rows: Sequence[PoseErrorRow]) -> list[tuple[int, int]]:
     """Pairs of readable rows one step apart along one noise axis, the one of less noise first."""
-    levels = [(1.0 / row.pi_over, row.position_error_in) for row in rows]
+    levels = [Spec.of(row).levels for row in rows]
     readable = [number for number, row in enumerate(rows) if row.sure]
     pairs = []
     for b in readable:

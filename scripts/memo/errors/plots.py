@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from ....assets.memo import PoseErrorRow
-from ...report.plots import COLOURS
-from ..plots import in_style, svg_of
-from .judge import COLUMNS, NAMES, label, means, printed, standard_errors
+from ...report.drawing import COLOURS, FAINT, in_style, panels_of, svg_of
+from ..trial import Spec
+from .judge import COLUMNS, NAMES, means, printed, standard_errors
 from .trials import DIRECTION, METHODS, WHOLE, Errors
 
 METHOD_COLOURS = dict(zip(METHODS, (COLOURS[1], COLOURS[0]), strict=True))
@@ -28,11 +28,7 @@ def draw_means(rows: Sequence[PoseErrorRow], errors: Sequence[Errors]) -> str:
     Returns:
         The drawing as SVG.
     """
-    import matplotlib.pyplot as plt
-
-    figure, panels = plt.subplots(
-        1, len(NAMES), figsize=(9.0, 0.6 + 0.27 * len(rows)), sharey=True, layout="constrained"
-    )
+    figure, panels = panels_of(len(NAMES), (3.0, 0.2 + 0.27 * len(rows)), sharey=True)
     heights = np.arange(len(rows))
     for place, (panel, name, column) in enumerate(zip(panels, NAMES, COLUMNS, strict=True)):
         for method, marker, drop in zip(METHODS, "so", (0.14, 0.28), strict=True):
@@ -56,9 +52,9 @@ def draw_means(rows: Sequence[PoseErrorRow], errors: Sequence[Errors]) -> str:
             panel.plot(values, heights[chosen], "x", markersize=4.5, **shown)
         panel.set(title=name, xscale="log", ylim=(len(rows) - 0.4, -0.6))
         panel.xaxis.set_major_formatter("{x:g}")
-        panel.grid(axis="x", color="#e4e4e4", linewidth=0.6)
+        panel.grid(axis="x", color=FAINT, linewidth=0.6)
         panel.set_axisbelow(True)
-    panels[0].set_yticks(heights, [", ".join(label(row)) for row in rows])
+    panels[0].set_yticks(heights, [", ".join(Spec.of(row).key) for row in rows])
     handles, names = panels[0].get_legend_handles_labels()
     figure.legend(handles, names, loc="outside lower center", ncols=len(names), frameon=False)
     return svg_of(figure)
@@ -71,9 +67,7 @@ def draw_singularity(errors: Sequence[Errors]) -> str:
     Returns:
         The drawing as SVG.
     """
-    import matplotlib.pyplot as plt
-
-    figure, panels = plt.subplots(1, 2, figsize=(6.5, 2.4), sharey=True, layout="constrained")
+    figure, panels = panels_of(2, (3.25, 2.0), sharey=True)
     angles = np.concatenate([error.angles for error in errors])
     found = np.concatenate([error.by_method[METHODS[0]] for error in errors])
     shown = ((panels[0], DIRECTION, "direction"), (panels[1], WHOLE, "whole rotation"))
@@ -90,7 +84,7 @@ def draw_singularity(errors: Sequence[Errors]) -> str:
         )
         panel.set(title=title, xlabel="angle of the true rotation, °", xlim=(0, 180))
         panel.set_xticks(range(0, 181, 30))
-        panel.grid(color="#ececec", linewidth=0.6)
+        panel.grid(color=FAINT, linewidth=0.6)
     panels[0].set(yscale="log", ylabel="error, °")
     panels[0].yaxis.set_major_formatter("{x:g}")
     return svg_of(figure)

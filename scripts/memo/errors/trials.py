@@ -5,38 +5,23 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
-from ....envs.library import load_library
 from ....envs.probe_env import INCH
 from ....envs.sensors.grid import sense_grid
-from ....recognizer import PairTables, Polyhedron
-from ....recognizer.poses.fits.pose import ModelTest
 from ....recognizer.tree.tree import prune
-from ..noise import noise_of
+from ..plan import Trials
 from ..pose import memo_pose
+from ..trial import Spec, prepared
 
 Floats = NDArray[np.float64]
 
 METHODS = ("the memo's method", "joint fit")
 DIRECTION, ANGLE, WHOLE, TRANSLATION = range(4)
 """Columns of what is measured of a pose."""
-
-
-@dataclass(frozen=True)
-class Trials:
-    """Some trials of a row."""
-
-    object_name: str
-    pi_over: int
-    inches: float
-    seed: int
-    first: int
-    count: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,25 +45,23 @@ class Errors:
         )
 
 
-def measure_errors(case: Trials) -> Errors:
+def measure_errors(piece: Trials[Spec]) -> Errors:
     """Sense an object, and compare the poses of the right interpretation with the truth.
 
     A trial's pose and its shares of the noise depend on its number alone, so that rows of one
     object differ by their bounds and by nothing else.
     """
-    model, tables, test = _prepared(case.object_name)
-    noise = noise_of(case.pi_over, case.inches)
-    by_method = {name: np.full((case.count, 4), np.nan) for name in METHODS}
-    angles, lost = np.empty(case.count), 0
-    for row in range(case.count):
-        rng = np.random.default_rng([case.seed, case.first + row])
-        truth = sense_grid(model, rng)
+    thing, noise = prepared(piece.row.object_name), piece.row.noise()
+    by_method = {name: np.full((piece.count, 4), np.nan) for name in METHODS}
+    angles, lost = np.empty(piece.count), 0
+    for row, rng in enumerate(piece.generators()):
+        truth = sense_grid(thing.model, rng)
         contacts = truth.noisy(noise, rng)
         angles[row] = math.degrees(truth.T_world_object.rotation.magnitude())
-        fitted = test.run(truth.faces[None], contacts)
-        kept = (prune(tables, contacts).faces == truth.faces).all(axis=1).any()
+        fitted = thing.test.run(truth.faces[None], contacts)
+        kept = (prune(thing.tables, contacts).faces == truth.faces).all(axis=1).any()
         lost += not (kept and len(fitted))
-        poses = {METHODS[0]: memo_pose(model, truth.faces, contacts)}
+        poses = {METHODS[0]: memo_pose(thing.model, truth.faces, contacts)}
         if len(fitted):
             turn = Rotation.from_matrix(fitted.rotations[0])
             poses[METHODS[1]] = RigidTransform.from_components(fitted.translations[0], turn)
@@ -108,9 +91,3 @@ def pose_errors(pose: RigidTransform, truth: RigidTransform) -> Floats:
     whole = float((pose.rotation.inv() * truth.rotation).magnitude())
     shift = float(np.linalg.norm(pose.translation - truth.translation)) / INCH
     return np.array([*map(math.degrees, (between, turned, whole)), shift])
-
-
-@cache
-def _prepared(name: str) -> tuple[Polyhedron, PairTables, ModelTest]:
-    (model,) = load_library([name])
-    return model, PairTables.of(model), ModelTest(model)

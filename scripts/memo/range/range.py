@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from ....assets.memo import RangeRow, place, range_setting, range_views
 from ....envs.sensors.range_image import RangeView
 from ...report.markdown import Table
-from ..section import Comparison, Figure, Plan, Section
+from ..plan import Plan, run_rows
+from ..section import Comparison, Figure, Section
 from .picture import FoundPose, PictureRow, draw_views
 from .trials import (
     ELEVATION,
@@ -19,19 +20,16 @@ from .trials import (
     READINGS,
     WIDTH,
     Outcome,
-    Trials,
     generator,
     interpret,
-    prepared,
     readings,
     scan_views,
+    scanning,
     take_view,
 )
 
 TRIALS = 50
 """Placements of the object a view; the memo had one."""
-CHUNK = 5
-"""Trials that a process does in one go."""
 FACTOR = 4.0
 """A median counts as of the memo's order if it is within this factor."""
 NAMES = ("interpretations", "transforms")
@@ -40,28 +38,15 @@ NAMES = ("interpretations", "transforms")
 def run(plan: Plan) -> Section:
     """Scan the housing from many sides, 11 and 9 points, beside the memo's two views."""
     views, trials = range_views(), plan.trials or TRIALS
-    cases = [
-        Trials(view.points, plan.seed, first, min(CHUNK, trials - first))
-        for view in views
-        for first in range(0, trials, CHUNK)
-    ]
-    found = list(plan.map(scan_views, cases, "range images"))
-    outcomes = []
-    for view in views:
-        own = [one for case, one in zip(cases, found, strict=True) if case.points == view.points]
-        outcomes.append(
-            Outcome(
-                np.concatenate([one.counts for one in own]),
-                np.concatenate([one.sure for one in own]),
-                sum(one.lost for one in own),
-            )
-        )
+    points = [view.points for view in views]
+    found = run_rows(plan, points, trials, scan_views, "range images")
+    outcomes = [Outcome.join(pieces) for pieces in found.values()]
     return _section(views, outcomes, plan.seed)
 
 
 def _section(views: Sequence[RangeRow], outcomes: Sequence[Outcome], seed: int) -> Section:
     setting, trials = range_setting(), len(outcomes[0].counts)
-    scanner = next(iter(prepared()[2].values()))
+    scanner = next(iter(scanning()[2].values()))
     compared = tuple(_compare(view, outcome) for view, outcome in zip(views, outcomes, strict=True))
     chosen = [_illustration(view, one) for view, one in zip(views, outcomes, strict=True)]
     rows = [_picture_row(view, trial, seed) for view, trial in zip(views, chosen, strict=True)]
@@ -187,7 +172,7 @@ def _picture_row(view: RangeRow, trial: int, seed: int) -> PictureRow:
         FoundPose(one.pose, bool((one.interpretations == seen.faces).all(axis=1).any()))
         for one in hypotheses
     ]
-    scene, _, scanners = prepared()
+    scene, _, scanners = scanning()
     diameter, command = seen.model.diameter, seen.command
     return PictureRow(
         title=f"{view.points} points, as in {view.view}",

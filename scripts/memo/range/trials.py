@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -11,17 +12,18 @@ from scipy.spatial.transform import RigidTransform
 
 from ....assets.memo import range_setting, range_views
 from ....envs.library import load_library
-from ....envs.probe_env import INCH
 from ....envs.scene.placement import Resting
 from ....envs.scene.scene import OBJECT, ProbeScene
 from ....envs.sensors.noise import SensorNoise
 from ....envs.sensors.range_sensor import MEMO_SPACING, RangeScanner
 from ....envs.sensors.touch import ProbeCommand
-from ....recognizer import Contacts, Hypothesis, PairTables, Polyhedron, PoseTolerance
+from ....recognizer import Contacts, Hypothesis, Polyhedron, PoseTolerance
 from ....recognizer.beliefs.hypotheses import cluster
 from ....recognizer.models.rays import cast_rays
-from ....recognizer.poses.fits.pose import ModelTest
 from ....recognizer.tree.tree import prune
+from ..noise import noise_of
+from ..plan import Trials
+from ..trial import prepared
 
 Floats = NDArray[np.float64]
 
@@ -41,16 +43,6 @@ READINGS = (
 """What the recogniser is given of a view, see `readings`."""
 
 
-@dataclass(frozen=True)
-class Trials:
-    """Some trials of a view."""
-
-    points: int
-    seed: int
-    first: int
-    count: int
-
-
 @dataclass(frozen=True, eq=False)
 class Outcome:
     """What some trials left."""
@@ -62,6 +54,15 @@ class Outcome:
     """(t,) the widest bound on a normal that the scanner derived, radians."""
     lost: int
     """Trials in which the right interpretation was dropped, of any reading."""
+
+    @classmethod
+    def join(cls, parts: Sequence[Outcome]) -> Outcome:
+        """All trials of all parts, at least one."""
+        return cls(
+            np.concatenate([part.counts for part in parts]),
+            np.concatenate([part.sure for part in parts]),
+            sum(part.lost for part in parts),
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,13 +78,13 @@ class View:
     """(n,) the face under each."""
 
 
-def scan_views(case: Trials) -> Outcome:
-    """Place, scan and recognise the object."""
-    counts, lost = np.empty((case.count, len(READINGS), 3), np.int64), 0
-    sure = np.empty(case.count)
-    for row in range(case.count):
-        rng = generator(case.seed, case.points, case.first + row)
-        view = take_view(case.points, rng)
+def scan_views(piece: Trials[int]) -> Outcome:
+    """Place, scan and recognise the object; rows are numbers of points."""
+    counts, lost = np.empty((piece.count, len(READINGS), 3), np.int64), 0
+    sure = np.empty(piece.count)
+    for row, number in enumerate(piece.numbers):
+        rng = generator(piece.seed, piece.row, number)
+        view = take_view(piece.row, rng)
         sure[row] = view.contacts.normal_error.max()
         kept = True
         for column, contacts in enumerate(readings(view, rng)):
@@ -106,7 +107,7 @@ def take_view(points: int, rng: np.random.Generator) -> View:
     Raises:
         ValueError: no view has them.
     """
-    scene, placement, scanners = prepared()
+    scene, placement, scanners = scanning()
     model = scene.model
     for _ in range(MOST_DRAWS):
         scene.place(placement.draw(rng, model))
@@ -152,9 +153,9 @@ def interpret(
         Interpretations that the tree leaves and that the model test leaves, distinct transforms;
         the transforms, likeliest first; and whether the right interpretation is in one of them.
     """
-    tables, test = _recognition()
-    pruned = prune(tables, contacts)
-    poses = test.run(pruned.faces, contacts)
+    thing = prepared(OBJECT_NAME)
+    pruned = prune(thing.tables, contacts)
+    poses = thing.test.run(pruned.faces, contacts)
     error = float(contacts.position_error.max())
     hypotheses, weights = cluster(view.model, poses, PoseTolerance(), error)
     kept = bool((poses.faces == view.faces).all(axis=1).any())
@@ -165,9 +166,7 @@ def interpret(
 def memo_noise() -> SensorNoise:
     """The bounds that the memo used."""
     setting = range_setting()
-    return SensorNoise(
-        position_error=setting.position_error_in * INCH, normal_error=np.pi / setting.pi_over
-    )
+    return noise_of(setting.pi_over, setting.position_error_in)
 
 
 def generator(seed: int, points: int, trial: int) -> np.random.Generator:
@@ -182,7 +181,7 @@ def _independent(normals: Floats) -> bool:
 
 
 @cache
-def prepared() -> tuple[ProbeScene, Resting, dict[int, RangeScanner]]:
+def scanning() -> tuple[ProbeScene, Resting, dict[int, RangeScanner]]:
     """The scene, how its object is placed, and a scanner for each number of points."""
     (model,) = load_library([OBJECT_NAME])
     scanners = {
@@ -197,9 +196,3 @@ def prepared() -> tuple[ProbeScene, Resting, dict[int, RangeScanner]]:
         for view in range_views()
     }
     return ProbeScene(model), Resting(offset=0.0), scanners
-
-
-@cache
-def _recognition() -> tuple[PairTables, ModelTest]:
-    (model,) = load_library([OBJECT_NAME])
-    return PairTables.of(model), ModelTest(model)
