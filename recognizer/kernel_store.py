@@ -62,6 +62,14 @@ def is_prepared() -> bool:
     return folder is not None and _read(folder / PREPARED) == mark()
 
 
+def announcement() -> str:
+    """What is said before kernels are compiled."""
+    return (
+        "palpate: first use: compiling its kernels, once, for about two minutes, into"
+        f" {kernel_folder()} (`palpate prepare` does it beforehand)"
+    )
+
+
 @cache
 def mark() -> str:
     """What the kernels of this version are compiled for."""

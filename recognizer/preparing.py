@@ -17,23 +17,18 @@ from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
 
-from .kernel_store import PREPARED, is_prepared, kernel_folder, mark, packages
+from .kernel_store import PREPARED, announcement, is_prepared, kernel_folder, mark, packages
 
 WORKERS = 2
 """Processes. More would compile what others need too."""
 COMPILES_HERE = "PALPATE_COMPILES_HERE"
 """Set in the environment of these processes, which are not to start others."""
+TOLD = "PALPATE_TOLD"
+"""Set in the environment by a command that has said it already."""
 KERNELS = 290
 """About as many are there, for the progress that is shown."""
 STEPS = 4
 """Lines of progress where they can't be written over each other."""
-
-
-def announcement() -> str:
-    """What is said when kernels have to be compiled."""
-    folder = kernel_folder()
-    where = "and can keep nothing" if folder is None else f"into {folder}"
-    return f"palpate: compiling, once, for about two minutes, {where}"
 
 
 def prepare() -> bool:
@@ -51,7 +46,8 @@ def prepare() -> bool:
     folder = kernel_folder()
     if is_prepared() or folder is None:
         return False
-    print(announcement(), file=sys.stderr, flush=True)
+    if TOLD not in os.environ:
+        print(announcement(), file=sys.stderr, flush=True)
     with _alone(folder):
         if is_prepared():
             return True

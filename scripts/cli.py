@@ -14,11 +14,13 @@ import typer
 from .commands.benchmark import benchmark
 from .commands.episode import episode
 from .commands.library import library
+from .commands.prepare import prepare
 from .commands.recognize import recognize
 from .commands.report import report
 from .commands.reproduce import reproduce
 from .commands.suggest import suggest
 from .commands.view import view
+from .first_use import tell_first_use
 
 __all__ = ["app", "main"]
 
@@ -37,7 +39,10 @@ app.command()(library)
 app.command()(benchmark)
 app.command()(report)
 app.command()(reproduce)
+app.command()(prepare)
 
+NEEDS_KERNELS = ("episode", "recognize", "suggest", "view", "library", "benchmark", "reproduce")
+"""Commands that wait for palpate to compile itself when it is first used."""
 BAD_INPUT = 2
 INTERRUPTED = 130
 
@@ -101,3 +106,5 @@ def palpate(
     """Recognise objects by touch: which one it is, where it lies, and where to touch next."""
     if context.invoked_subcommand is None:
         print(context.get_help())
+    elif context.invoked_subcommand in NEEDS_KERNELS and not {"-h", "--help"} & set(sys.argv):
+        tell_first_use()
