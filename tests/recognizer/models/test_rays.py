@@ -44,7 +44,7 @@ def test_rays_meet_the_triangles_that_plain_linear_algebra_finds(name):
         assert hits.faces[ray] == solid.triangle_faces[triangle]
         end = starts[ray] + depth * directions[ray]
         np.testing.assert_allclose(hits.points_world[ray], end, atol=1e-10 * solid.diameter)
-        normal = pose.rotation.apply(solid.normals[hits.faces[ray]])
+        normal = pose.rotation.apply(solid.normals[hits.faces[ray]].copy())
         np.testing.assert_allclose(hits.normals_world[ray], normal, atol=1e-12)
         assert normal @ directions[ray] < 0.0
     assert hits.hit.any()

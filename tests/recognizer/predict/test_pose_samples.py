@@ -145,7 +145,7 @@ def test_samples_scatter_as_those_that_rejection_leaves_of_a_box_around_the_fami
         points = rotations.inv().apply(contacts.positions[row] - poses[:, :3]) + solid.centroid
         gaps = triangle_distances(points, corners_of(solid, face)).reshape(len(poses), -1)
         allowed &= gaps.min(axis=1) <= contacts.position_error[row]
-        normals = rotations.apply(solid.normals[face])
+        normals = rotations.apply(solid.normals[face].copy())
         allowed &= normals @ contacts.normals[row] >= np.cos(contacts.normal_error[row])
     assert allowed.sum() > 100
     ratio = along.std(axis=0) / drawn[allowed].std(axis=0)
