@@ -191,8 +191,9 @@ def test_tables_share_no_memory_with_the_models_own_arrays(tmp_path):
 
 
 def test_every_module_that_tables_are_built_by_is_part_of_the_key():
-    # A model's own arrays are hashed, and what triples add is built from the tables each time.
-    harmless = {"polyhedron", "triples"}
+    # A model's own arrays are hashed, what triples add is built from the tables each time, and how
+    # kernels are compiled says nothing of what they compute.
+    harmless = {"compiling", "polyhedron", "triples"}
     named = {module.__name__.rpartition(".")[2] for module in table_cache.BUILDERS}
     imported = 0
     for module in table_cache.BUILDERS:
