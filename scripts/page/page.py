@@ -1,7 +1,7 @@
 """A story as one HTML file that needs nothing else: no server, no network, no viewer installed.
 
-three.js draws; it stands in the file, with its licence. A content security policy in the file's
-head forbids the browser to load anything.
+three.js draws; its modules, as they are published, stand in the file as data addresses, with their
+licence. A content security policy in the file's head forbids the browser to load anything else.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ import json
 from importlib import resources
 from pathlib import Path
 from string import Template
+from urllib.parse import quote
 
 from ..whole_file import write_whole
 from .story import Story
@@ -18,7 +19,19 @@ __all__ = ["check_page_path", "page", "story_json", "write_page"]
 
 SCRIPTS = ("story.js", "scene.js", "panel.js", "page.js")
 """Of the page, in the order in which they build on each other."""
-POLICY = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:"
+MODULES = {
+    "three": "three.module.min.js",
+    "three/core": "three.core.min.js",
+    "three/addons/controls/OrbitControls.js": "OrbitControls.js",
+}
+"""What the page and three.js import, and where among the assets it is; see assets/SOURCES.md."""
+CORE = "./three.core.min.js"
+"""How a module imports its other half; a data address has no neighbours, so a name is put there."""
+PLAIN = "".join(set(map(chr, range(ord(" "), 127))) - set('%#"\\<'))
+"""What may stand in a data address in JSON in HTML as it is."""
+POLICY = (
+    "default-src 'none'; script-src 'unsafe-inline' data:; style-src 'unsafe-inline'; img-src data:"
+)
 """Nothing is loaded, not even from the same place; scripts and styles are the file's own."""
 LIVE_POLICY = f"{POLICY}; connect-src 'self'"
 
@@ -36,7 +49,7 @@ def page(document: str, *, live: bool = False) -> str:
         style=_asset("page.css"),
         story=document,
         licence=_asset("three-LICENSE.txt"),
-        three=_asset("three.js"),
+        modules=json.dumps({"imports": {name: _address(file) for name, file in MODULES.items()}}),
         script="\n".join(_asset(name) for name in SCRIPTS),
     )
 
@@ -72,6 +85,12 @@ def write_page(story: Story, path: Path) -> int:
     content = page(story_json(story)).encode()
     write_whole(path, content)
     return len(content)
+
+
+def _address(file: str) -> str:
+    """A module as an address that holds it."""
+    text = _asset(file).replace(f'"{CORE}"', '"three/core"')
+    return f"data:text/javascript;charset=utf-8,{quote(text, safe=PLAIN)}"
 
 
 def _asset(name: str) -> str:

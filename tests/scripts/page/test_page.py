@@ -11,6 +11,7 @@ from dataclasses import replace
 from hashlib import sha256
 from importlib import resources
 from pathlib import Path
+from urllib.parse import unquote
 
 import numpy as np
 import pytest
@@ -26,7 +27,7 @@ from palpate.recognizer import Constraints, Contacts, FeltFile, FreeSpace, Recog
 from palpate.recognizer.tree.tree import prune, spread_order
 from palpate.scripts.benchmark.playing import task_of
 from palpate.scripts.cli import app
-from palpate.scripts.page.page import check_page_path, page, story_json, write_page
+from palpate.scripts.page.page import CORE, MODULES, check_page_path, page, story_json, write_page
 from palpate.scripts.page.story import Story
 from palpate.scripts.page.story_contacts import Beliefs, contacts_story
 from palpate.scripts.page.story_episode import episode_stories
@@ -238,16 +239,30 @@ def test_one_file_that_asks_for_nothing_and_is_small(story, tmp_path):
     assert size == len(text.encode()) < 1e6
     assert "default-src 'none'" in text
     own = text.replace("http://www.w3.org/1999/xhtml", "")  # a name, not a place
+    own = own.replace("https://jcgt.org/published/0007/04/01/", "")  # a comment in a shader
     assert re.findall(r"https?://[^\s'\"<]+", own) == []
     assert re.findall(r"<(?:script|img|iframe|link)[^>]*(?:src|href)=[\"'](?!data:)", own) == []
     assert "three.js authors" in text
     assert [path.name for path in tmp_path.iterdir()] == ["a.html"]
 
 
-def test_the_viewer_is_the_file_that_sources_names():
+def test_the_viewer_is_the_files_that_sources_names_and_no_others():
     folder = Path(str(resources.files("palpate.assets")))
     told = (folder / "SOURCES.md").read_text(encoding="utf-8")
-    assert sha256((folder / "page" / "three.js").read_bytes()).hexdigest() in told
+    named = dict(re.findall(r"^\| `([\w.-]+)` \| `[\w./]+` \| `([0-9a-f]{64})` \|$", told, re.M))
+    assert set(named) == {*MODULES.values(), "three-LICENSE.txt"}
+    for name, digest in named.items():
+        assert sha256((folder / "page" / name).read_bytes()).hexdigest() == digest, name
+
+
+def test_modules_stand_in_a_page_as_they_are_but_for_the_name_of_one():
+    text = page("{}")
+    (modules,) = re.findall(r'<script type="importmap">(.*?)</script>', text)
+    for name, address in json.loads(modules)["imports"].items():
+        told = unquote(address.removeprefix("data:text/javascript;charset=utf-8,"))
+        whole = (resources.files("palpate.assets") / "page" / MODULES[name]).read_text("utf-8")
+        assert told.replace('"three/core"', f'"{CORE}"') == whole
+        assert (told != whole) == (name == "three")
 
 
 def test_where_no_page_can_be_written_is_said(story, tmp_path):
