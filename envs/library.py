@@ -32,3 +32,15 @@ def load_library(source: LibrarySource = None) -> tuple[Polyhedron, ...]:
         item if isinstance(item, Polyhedron) else Polyhedron.from_mesh(mesh_path(item), name=item)
         for item in source
     )
+
+
+def checked_name(name: str | None, library: Sequence[Polyhedron]) -> str | None:
+    """The same name.
+
+    Raises:
+        ValueError: no model of the library has it.
+    """
+    known = [model.name for model in library]
+    if name is not None and name not in known:
+        raise ValueError(f"no object is called {name!r}; the library has: {', '.join(known)}")
+    return name

@@ -134,3 +134,14 @@ class ObservationLayout:
         values["sample_position_spread"][:shown] = samples.position_spread.clip(0.0, self.extent)
         values["sample_rotation_spread"][:shown] = samples.rotation_spread.clip(0.0, np.pi)
         return values
+
+
+def check_sizes(**sizes: int) -> None:
+    """Check the arguments that say how much an observation holds.
+
+    Raises:
+        ValueError: one is below 1.
+    """
+    for name, value in sizes.items():
+        if value < 1:
+            raise ValueError(f"{name} is {value}; it must be at least 1")

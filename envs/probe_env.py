@@ -4,47 +4,38 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import gymnasium
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
-from scipy.spatial.transform import RigidTransform
 
 from ..recognizer import (
     Belief,
     Contacts,
-    Polyhedron,
     PoseTolerance,
     Recognizer,
     SearchLimits,
     SupportPlane,
 )
-from ..recognizer.predict.pose_samples import sample_belief
-from ..recognizer.predict.prediction import PoseSamples
-from .library import LibrarySource, load_library
-from .observation import Observation, ObservationLayout
+from .knowledge import KEPT_WITHIN, Knowing, Knowledge
+from .library import LibrarySource, checked_name, load_library
+from .observation import Observation, ObservationLayout, check_sizes
 from .pictures.episode import Episode
+from .pictures.view_mode import view_in
 from .scene.free_body import STILL
-from .scene.free_object import SINK, FreeObject
+from .scene.free_object import SINK, free_object
 from .scene.placement import make_placement
 from .scene.scene import ProbeScene, check_size
-from .sensors.evidence import Evidence
 from .sensors.finger_sensor import FingerSensor
 from .sensors.noise import Distribution, SensorNoise
 from .sensors.sensors import make_sensors
-from .sensors.touch import ProbeCommand, Sensor, Touch
-
-if TYPE_CHECKING:
-    from .pictures.episode_view import EpisodeView
+from .sensors.touch import ProbeCommand, Sensor, Touch, finite_action
 
 INCH = 0.0254
 HALF_WIDTH = 0.375
 """Half the side of the square that triads meet in, in diameters of the largest object."""
-KEPT_WITHIN = 0.02
-"""Contacts with an object that was pushed since are dropped once their places are known to no
-better than this, in diameters of the largest object."""
 REACH = 2.0
 """Rays start this many diameters of the largest object before the point where they meet."""
 
@@ -204,16 +195,11 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
                 or fewer than one probe, hypothesis or sample.
             gymnasium.error.DependencyNotInstalled: render mode "human" where no window can open.
         """
-        sizes = {
-            "max_probes": max_probes,
-            "hypotheses_shown": hypotheses_shown,
-            "samples_shown": samples_shown,
-        }
-        for name, value in sizes.items():
-            if value < 1:
-                raise ValueError(f"{name} is {value}; it must be at least 1")
+        check_sizes(
+            max_probes=max_probes, hypotheses_shown=hypotheses_shown, samples_shown=samples_shown
+        )
         self.render_mode = render_mode
-        self._view = None if render_mode is None else _view(render_mode)
+        self._view = view_in(render_mode, self.metadata["render_modes"])
         noise = SensorNoise(
             position_error=position_error, normal_error=normal_error, distribution=distribution
         )
@@ -221,14 +207,11 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
         for model in self.library:
             check_size(model)
         self._index = {model.name: row for row, model in enumerate(self.library)}
-        if object_name is not None and object_name not in self._index:
-            known = ", ".join(self._index)
-            raise ValueError(f"no object is called {object_name!r}; the library has: {known}")
-        self._object_name = object_name
+        self._object_name = checked_name(object_name, self.library)
         largest = max(model.diameter for model in self.library)
         self.half_width = HALF_WIDTH * largest
         self._placement = make_placement(placement, 0.2 * self.half_width)
-        self._free = _free_object(free, placement, mass, friction)
+        self._free = free_object(free, placement, mass, friction)
         # One plane for all: its error is that of the largest object.
         support = self._placement.support(max(self.library, key=lambda model: model.diameter))
         if support and self._free:
@@ -241,8 +224,10 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
         self.recognizer = Recognizer(
             self.library, features="all" if every else "faces", tolerance=tolerance, limits=limits
         )
-        self._kept_within = KEPT_WITHIN * largest
         self.use_free_space = use_free_space
+        self._knowing = Knowing(
+            self.recognizer, KEPT_WITHIN * largest, use_free_space, samples_shown
+        )
         self._scenes: dict[str, ProbeScene] = {}
         self._max_probes = max_probes
         self._layout = ObservationLayout(
@@ -256,41 +241,22 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
         self._numbers = 3 if len(self.sensors) == 1 else 4
         self.action_space = spaces.Box(-1.0, 1.0, (self._numbers,), np.float32)
         self._scene: ProbeScene | None = None
-        self._evidence = Evidence.none()
-        self._belief: Belief | None = None
-        self._samples = PoseSamples.none(self.library)
+        self._known = Knowledge.none(self.library)
 
     @property
     def belief(self) -> Belief | None:
         """What the recogniser makes of the contacts so far; None before the first contact."""
-        return self._belief
+        return self._known.belief
 
     @property
     def contacts(self) -> Contacts:
         """All contacts so far that still hold."""
-        return self._evidence.contacts
+        return self._known.evidence.contacts
 
     @property
     def touches(self) -> tuple[Touch, ...]:
         """What each probe reported."""
-        return self._evidence.touches
-
-    @property
-    def episode(self) -> Episode:
-        """The episode as it stands, the truth included; for scoring and pictures alone.
-
-        Raises:
-            gymnasium.error.ResetNeeded: before the first reset.
-        """
-        return Episode(
-            library=self.library,
-            true_object=self.true_object,
-            T_world_object=self.T_world_object,
-            touches=self.touches,
-            contacts=self.contacts,
-            belief=self.belief,
-            tolerance=self.recognizer.tolerance,
-        )
+        return self._known.evidence.touches
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -308,9 +274,7 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
                 # What else is in the scene tells in the last bits of how an object comes to rest.
                 self._scene.mount(sensor.design)
         self._scene.place(self._placement.draw(rng, self._scene.model))
-        self._evidence = Evidence.none()
-        self._belief = None
-        self._samples = PoseSamples.none(self.library)
+        self._known = Knowledge.none(self.library)
         self._show()
         return self._observe(), self._info()
 
@@ -324,16 +288,12 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
             gymnasium.error.ResetNeeded: before the first reset.
         """
         scene = self._placed()
-        wanted = np.asarray(action, np.float64)
-        if wanted.shape != (self._numbers,) or not np.isfinite(wanted).all():
-            wanted_are = "three" if self._numbers == 3 else "four"
-            raise ValueError(f"an action is {wanted_are} finite numbers, not {action!r}")
-        x, y, yaw, *choice = np.clip(wanted, -1.0, 1.0).tolist()
+        x, y, yaw, *choice = finite_action(action, self._numbers).tolist()
         command = ProbeCommand(x * self.half_width, y * self.half_width, yaw * np.pi / 3.0)
         touch = self._chosen(*choice).touch(scene, command, self.np_random)
-        self._evidence = self._evidence.after(touch, self._kept_within)
-        self._recognize(touch)
-        ended = self._belief is not None and (self._belief.unique or self._belief.empty)
+        self._known = self._knowing.after(self._known, touch, self._standing)
+        belief = self.belief
+        ended = belief is not None and (belief.unique or belief.empty)
         truncated = len(self.touches) >= self._max_probes
         self._show()
         return self._observe(), -1.0, ended, truncated, self._info()
@@ -346,22 +306,12 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
         """
         if self._view is None or self.render_mode != "rgb_array":
             return None
-        return self._view.picture(self.episode)
+        return self._view.picture(Episode.of(self, self._info()))
 
     def close(self) -> None:
         """End what draws, and close the window, if there is one."""
         if self._view is not None:
             self._view.close()
-
-    @property
-    def true_object(self) -> Polyhedron:
-        """What the object truly is; for scoring and pictures alone."""
-        return self._placed().model
-
-    @property
-    def T_world_object(self) -> RigidTransform:
-        """Where the object truly is; for scoring and pictures alone."""
-        return self._placed().T_world_object
 
     def _placed(self) -> ProbeScene:
         if self._scene is None:
@@ -373,66 +323,28 @@ class ProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
         count = len(self.sensors)
         return self.sensors[min(int(0.5 * (choice + 1.0) * count), count - 1)]
 
-    def _recognize(self, touch: Touch) -> None:
-        """Have the belief be that of the evidence, to which a touch was added last."""
-        known = self._evidence
-        if not (len(touch.contacts) or self.use_free_space or known.changed):
-            return
-        if not len(known.contacts):
-            self._belief = None
-            self._samples = PoseSamples.none(self.library)
-            return
+    def _standing(self) -> SupportPlane | None:
+        """The plane that the object is known to stand on."""
         support = self._support
         if self._free and support and not self._placed().stands(support.error):
-            support = None  # it leans on something, or rolls: the promise doesn't hold
-        before = self._belief
-        if before is None or known.changed or before.support is not support:
-            free_space = known.free_space if self.use_free_space else None
-            self._belief = self.recognizer.recognize(
-                known.contacts, free_space=free_space, support=support
-            )
-        else:
-            paths = touch.free_space if self.use_free_space else None
-            self._belief = self.recognizer.update(before, touch.contacts, free_space=paths)
-        self._samples = sample_belief(self._belief, self.library, self._layout.samples)
+            return None  # it leans on something, or rolls: the promise doesn't hold
+        return support
 
     def _show(self) -> None:
         if self._view is not None:
-            self._view.show(self.episode)
+            self._view.show(Episode.of(self, self._info()))
 
     def _observe(self) -> Observation:
         # Past max_probes an episode may be stepped on; the observation keeps its last rows.
         touches = self.touches[-self._max_probes :]
         contacts = self.contacts[slice(-self._layout.rays, None)]
-        return self._layout.pack(contacts, touches, self._belief, self._samples, self._index)
+        return self._layout.pack(contacts, touches, self.belief, self._known.samples, self._index)
 
     def _info(self) -> dict[str, Any]:
-        pose = self.T_world_object.as_matrix()
-        info: dict[str, Any] = {"truth": {"object": self.true_object.name, "pose": pose}}
+        scene = self._placed()
+        pose = scene.T_world_object.as_matrix()
+        info: dict[str, Any] = {"truth": {"object": scene.model.name, "pose": pose}}
         if self._free:
             moved = self.touches[-1].displacement if self.touches else STILL
             info["displacement"] = {"distance": moved.distance, "turn": moved.turn}
         return info
-
-
-def _free_object(
-    free: bool, placement: str, mass: float | None, friction: float | None
-) -> FreeObject | None:
-    """How the object moves, if it does."""
-    if not free:
-        for name, value in (("mass", mass), ("friction", friction)):
-            if value is not None:
-                raise ValueError(f"{name} is {value:g}, but the object is held: give free=True")
-        return None
-    if placement == "across":
-        raise ValueError("a free object has to stand: placement must be 'resting' or 'dropped'")
-    return FreeObject(mass=mass) if friction is None else FreeObject(mass=mass, friction=friction)
-
-
-def _view(mode: str) -> EpisodeView:
-    if mode not in ProbeEnv.metadata["render_modes"]:
-        known = (None, *ProbeEnv.metadata["render_modes"])
-        raise ValueError(f"render_mode is {mode!r}; it must be one of {known}")
-    from .pictures.episode_view import EpisodeView  # matplotlib comes with it
-
-    return EpisodeView(mode)

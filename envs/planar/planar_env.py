@@ -240,16 +240,6 @@ class PlanarProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
         if self._window is not None:
             self._window.close()
 
-    @property
-    def true_object(self) -> Polygon:
-        """What the outline truly is; for scoring and pictures alone."""
-        return self._placed()[0]
-
-    @property
-    def T_world_object(self) -> RigidTransform:
-        """Where the outline truly is; for scoring and pictures alone."""
-        return self._placed()[1]
-
     def _placed(self) -> tuple[Polygon, RigidTransform]:
         if self._truth is None:
             raise gymnasium.error.ResetNeeded("call reset first")

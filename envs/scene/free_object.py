@@ -149,3 +149,22 @@ class FreeBody:
         lowest = float(pose.apply(self._object.vertices)[:, 2].min())
         heights = (pose.apply(face.corners)[:, 2] for face in self._faces)
         return lowest >= -error and any(np.abs(height).max() <= error for height in heights)
+
+
+def free_object(
+    free: bool, placement: str, mass: float | None, friction: float | None
+) -> FreeObject | None:
+    """How an environment's object moves; None if it is held.
+
+    Raises:
+        ValueError: a mass or a friction of an object that is held, or one that is free but doesn't
+            stand.
+    """
+    if not free:
+        for name, value in (("mass", mass), ("friction", friction)):
+            if value is not None:
+                raise ValueError(f"{name} is {value:g}, but the object is held: give free=True")
+        return None
+    if placement == "across":
+        raise ValueError("a free object has to stand: placement must be 'resting' or 'dropped'")
+    return FreeObject(mass=mass) if friction is None else FreeObject(mass=mass, friction=friction)

@@ -38,6 +38,19 @@ class ProbeCommand:
             raise ValueError(f"{self}: a command is three finite numbers")
 
 
+def finite_action(action: NDArray[np.floating], numbers: int) -> Floats:
+    """An action of a probing environment, clipped to its box.
+
+    Raises:
+        ValueError: another shape than ``(numbers,)``, or a number that isn't finite.
+    """
+    wanted = np.asarray(action, np.float64)
+    if wanted.shape != (numbers,) or not np.isfinite(wanted).all():
+        named = "three" if numbers == 3 else "four"
+        raise ValueError(f"an action is {named} finite numbers, not {action!r}")
+    return np.clip(wanted, -1.0, 1.0)
+
+
 @dataclass(frozen=True, eq=False)
 class Touch:
     """What one probe reported."""

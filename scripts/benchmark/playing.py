@@ -14,9 +14,10 @@ from ...envs.probe_env import REACH, ProbeEnv
 from ...envs.sensors.ball_sensor import BallSensor
 from ...envs.sensors.finger_sensor import FingerSensor
 from ...envs.sensors.touch import Sensor
+from ...envs.truth import Truth
 from ...policies import Policy, RandomProbe
 from ...policies.outcomes.task import Goal, Task
-from ...recognizer import Belief, pose_difference
+from ...recognizer import Belief, Polyhedron, pose_difference
 from ...recognizer.predict.probes import ProbeSpace
 from .config import Job, Setting, versions
 from .row import GAVE_UP, NOTHING_FITS, SOLVED, EpisodeRow
@@ -102,9 +103,9 @@ def probes(env: ProbeEnv, policy: Policy, seed: int) -> Iterator[Episode]:
     observation, _ = env.reset(seed=seed)
     ended = False
     while not ended:
-        observation, _, terminated, truncated, _ = env.step(policy.act(observation, rng))
+        observation, _, terminated, truncated, info = env.step(policy.act(observation, rng))
         ended = terminated or truncated
-        yield env.episode
+        yield Episode.of(env, info)
 
 
 @dataclass
@@ -119,6 +120,7 @@ class Opening:
     story: _Story
     ended: str
     """How the episode has ended already; empty if it hasn't."""
+    truth: Truth[Polyhedron]
 
 
 def open_episode(env: ProbeEnv, job: Job) -> Opening:
@@ -135,11 +137,11 @@ def open_episode(env: ProbeEnv, job: Job) -> Opening:
     rng = np.random.default_rng(np.random.SeedSequence(job.seed).spawn(1)[0])
     observation, _ = env.reset(seed=job.seed)
     first = RandomProbe(task_of(env, job.setting.goal)).act(observation, rng)
-    observation, _, _, truncated, _ = env.step(first)
+    observation, _, _, truncated, info = env.step(first)
     story = _Story([], [], [], [], [])
     story.add(env)
     ended = _outcome(env.belief, job.setting.goal) or (GAVE_UP if truncated else "")
-    return Opening(env, observation, rng, first, story, ended)
+    return Opening(env, observation, rng, first, story, ended, Truth.of(env.library, info))
 
 
 def play(opening: Opening, policy: Policy, job: Job) -> EpisodeRow:
@@ -150,19 +152,16 @@ def play(opening: Opening, policy: Policy, job: Job) -> EpisodeRow:
         policy: what chooses the probes after the first; if it has a ``reset``, that is called.
         job: which episode.
     """
-    env, observation, story, ended = (
-        opening.env,
-        opening.observation,
-        opening.story,
-        opening.ended,
-    )
+    env, observation, story = opening.env, opening.observation, opening.story
+    ended, truth = opening.ended, opening.truth
     getattr(policy, "reset", lambda: None)()
     while not ended:
         action = _timed_choice(policy, observation, opening.rng, story)
-        observation, _, _, truncated, _ = env.step(action)
+        observation, _, _, truncated, info = env.step(action)
+        truth = Truth.of(env.library, info)
         story.add(env)
         ended = _outcome(env.belief, job.setting.goal) or (GAVE_UP if truncated else "")
-    return _row(env, job, ended, opening.first, story)
+    return _row(env, truth, job, ended, opening.first, story)
 
 
 def _timed_choice(
@@ -190,14 +189,19 @@ def _outcome(belief: Belief | None, goal: Goal) -> str:
 
 
 def _row(
-    env: ProbeEnv, job: Job, ended: str, first: NDArray[np.floating], story: _Story
+    env: ProbeEnv,
+    truth: Truth[Polyhedron],
+    job: Job,
+    ended: str,
+    first: NDArray[np.floating],
+    story: _Story,
 ) -> EpisodeRow:
     setting = job.setting
-    found, errors = _compared(env)
+    found, errors = _compared(env.belief, truth)
     near = False
     if errors:
-        tolerance, model = env.recognizer.tolerance, env.true_object
-        most = tolerance.distance(model.diameter, setting.noise.position_error)
+        tolerance = env.recognizer.tolerance
+        most = tolerance.distance(truth.model.diameter, setting.noise.position_error)
         near = errors[0] <= tolerance.rotation and errors[1] <= most
     right = {SOLVED: found and (near or setting.goal == "object"), NOTHING_FITS: False}
     median, tail = (
@@ -219,7 +223,7 @@ def _row(
         diameter=max(model.diameter for model in env.library),
         episode=job.episode,
         seed=job.seed,
-        true_object=env.true_object.name,
+        true_object=truth.model.name,
         ended=ended,
         probes=len(env.touches),
         contacts=story.contacts_felt[-1],
@@ -239,10 +243,12 @@ def _row(
     )
 
 
-def _compared(env: ProbeEnv) -> tuple[bool, tuple[float, float] | None]:
+def _compared(
+    belief: Belief | None, truth: Truth[Polyhedron]
+) -> tuple[bool, tuple[float, float] | None]:
     """Whether the heaviest hypothesis is of the true object; then, by how much its pose is off."""
-    belief, model = env.belief, env.true_object
+    model = truth.model
     if belief is None or belief.empty or belief.hypotheses[0].object_name != model.name:
         return False, None
-    error = pose_difference(model, belief.hypotheses[0].pose, env.T_world_object)
+    error = pose_difference(model, belief.hypotheses[0].pose, truth.T_world_object)
     return True, (float(error.rotation), float(error.translation))

@@ -13,6 +13,7 @@ from ..page.episode_story import count, probe_line, stray_line, verdict, verdict
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from ...envs.pictures.episode import Episode
     from ...envs.pictures.film_script import EpisodeRecord
     from ...envs.probe_env import ProbeEnv
     from ...policies import Policy
@@ -165,11 +166,11 @@ def episode(
         _tell_strays(env, console)
     record, ruled_out = _play(env, chooser, seed, console)
     if json:
-        print(json_format.dumps(_document(env, seed), indent=2))
+        print(json_format.dumps(_document(env, record.probes[-1], seed), indent=2))
     else:
-        console.print(verdict(env))
+        console.print(verdict(record.probes[-1]))
     if not no_picture:
-        _draw(env, ruled_out, picture, console)
+        _draw(record.probes[-1], ruled_out, picture, console)
     if video is not None:
         _film(record, video, console)
     if html is not None:
@@ -186,14 +187,15 @@ def _play(
     """Play an episode and tell it; the record of it, and what was ruled out, the latest first."""
     import numpy as np
 
+    from ...envs.pictures.episode import Episode
     from ...envs.pictures.film_script import EpisodeRecord
     from ..benchmark.playing import probes
 
     console.print(
         f"{'probe':<8}  {'its rays met':<20}  interpretations  hypotheses left", style="dim"
     )
-    env.reset(seed=seed)  # as `probes` does
-    states = [env.episode]
+    _, info = env.reset(seed=seed)  # as `probes` does
+    states = [Episode.of(env, info)]
     ruled_out: list[tuple[Hypothesis, str]] = []
     before = env.belief
     for one in probes(env, chooser, seed):
@@ -207,9 +209,9 @@ def _play(
                 style="dim",
             )
         if before and env.belief and before is not env.belief:
-            ruled_out = _ruled_out(env, before, env.belief) + ruled_out
+            ruled_out = _ruled_out(one, before, env.belief) + ruled_out
         before = env.belief
-    return EpisodeRecord(states[0], tuple(states[1:]), verdict_in_short(env)), ruled_out
+    return EpisodeRecord(states[0], tuple(states[1:]), verdict_in_short(states[-1])), ruled_out
 
 
 def _tell_strays(env: ProbeEnv, console: Console) -> None:
@@ -222,20 +224,20 @@ def _tell_strays(env: ProbeEnv, console: Console) -> None:
             console.print(line)
 
 
-def _ruled_out(env: ProbeEnv, before: Belief, after: Belief) -> list[tuple[Hypothesis, str]]:
+def _ruled_out(episode: Episode, before: Belief, after: Belief) -> list[tuple[Hypothesis, str]]:
     """The heaviest hypotheses of one belief that no hypothesis of the next resembles."""
     from ...envs.pictures.episode_picture import likeness_of
 
-    likeness, gone = likeness_of(env.episode), []
+    likeness, gone = likeness_of(episode), []
     for old in before.hypotheses:
         if len(gone) < MOST_GHOSTS and not likeness.any_alike(
             old.object_name, old.pose, after.hypotheses
         ):
-            gone.append((old, f"{old.object_name}, ruled out by probe {len(env.touches)}"))
+            gone.append((old, f"{old.object_name}, ruled out by probe {len(episode.touches)}"))
     return gone
 
 
-def _document(env: ProbeEnv, seed: int) -> dict[str, object]:
+def _document(env: ProbeEnv, episode: Episode, seed: int) -> dict[str, object]:
     """The episode as the --json document.
 
     A hypothesis whose pose is not fixed stands for a family of poses: it is listed once for each
@@ -258,8 +260,8 @@ def _document(env: ProbeEnv, seed: int) -> dict[str, object]:
         ]
     return {
         "truth": {
-            "object": env.true_object.name,
-            "pose": env.T_world_object.as_matrix().tolist(),
+            "object": episode.true_object.name,
+            "pose": episode.T_world_object.as_matrix().tolist(),
         },
         "hypotheses": listed,
         "unique": belief.unique if belief else False,
@@ -271,21 +273,21 @@ def _document(env: ProbeEnv, seed: int) -> dict[str, object]:
 
 
 def _draw(
-    env: ProbeEnv, ruled_out: list[tuple[Hypothesis, str]], path: Path, console: Console
+    episode: Episode, ruled_out: list[tuple[Hypothesis, str]], path: Path, console: Console
 ) -> None:
     from ...envs.pictures.episode_picture import episode_picture
     from ...envs.pictures.picture import draw, renderer_note
 
-    belief = env.belief
+    belief = episode.belief
     alive = belief.hypotheses[1:] if belief and not belief.unique else ()
     rivals = [(rival, f"{rival.object_name}, still possible") for rival in alive]
     summary = "recognised" if belief and belief.unique else "not unique yet"
     scene = episode_picture(
-        env.episode,
+        episode,
         (rivals + ruled_out)[:MOST_GHOSTS],
-        title=f"{env.episode.true_object.name}: {summary}",
-        subtitle=f"{count(len(env.touches), 'probe')},"
-        f" {count(len(env.contacts), 'contact')} on the object",
+        title=f"{episode.true_object.name}: {summary}",
+        subtitle=f"{count(len(episode.touches), 'probe')},"
+        f" {count(len(episode.contacts), 'contact')} on the object",
     )
     note = renderer_note(draw(scene, path))
     console.print(f"\npicture: {path}" + (f" ({note})" if note else ""))

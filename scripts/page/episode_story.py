@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from scipy.spatial.transform import RigidTransform
 
     from ...envs.collision.collision import CollisionParts
-    from ...envs.probe_env import ProbeEnv
+    from ...envs.pictures.episode import Episode
     from ...envs.sensors.touch import Touch
     from ...recognizer import Belief, Polyhedron
 
@@ -47,16 +47,16 @@ def count(number: int, one: str, many: str = "") -> str:
     return f"{number} {one if number == 1 else many or one + 's'}"
 
 
-def verdict(env: ProbeEnv) -> str:
+def verdict(episode: Episode) -> str:
     """What was found, and how far it is from the truth."""
     import numpy as np
 
     from ...recognizer import pose_difference
 
-    belief, truth = env.belief, env.T_world_object
+    belief, truth = episode.belief, episode.T_world_object
     lines = [""]
     if belief is None:
-        return f"\nNo probe touched the object ({env.true_object.name})."
+        return f"\nNo probe touched the object ({episode.true_object.name})."
     if belief.empty:
         return "\nNo object of the library fits the contacts."
     best = belief.hypotheses[0]
@@ -64,30 +64,30 @@ def verdict(env: ProbeEnv) -> str:
         lines.append(f"It is [bold]{best.object_name}[/].")
     else:
         lines.append(
-            f"Not unique after {count(len(env.touches), 'probe')}:"
+            f"Not unique after {count(len(episode.touches), 'probe')}:"
             f" {count(len(belief.hypotheses), 'hypothesis', 'hypotheses')} left;"
             f" the heaviest is [bold]{best.object_name}[/] (weight {best.weight:.2f})."
         )
     lines.append(f"  pose   {_pose(best.pose)}")
-    lines.append(f"  truth  {_pose(truth)}  {env.true_object.name}")
-    if best.object_name == env.true_object.name:
-        error = pose_difference(env.true_object, best.pose, truth)
+    lines.append(f"  truth  {_pose(truth)}  {episode.true_object.name}")
+    if best.object_name == episode.true_object.name:
+        error = pose_difference(episode.true_object, best.pose, truth)
         lines.append(
             f"  error  {1e3 * error.translation:.2f} mm, {np.degrees(error.rotation):.2f}°"
-            f" after {count(len(env.touches), 'probe')} and"
-            f" {count(len(env.contacts), 'contact')}"
+            f" after {count(len(episode.touches), 'probe')} and"
+            f" {count(len(episode.contacts), 'contact')}"
         )
     return "\n".join(lines)
 
 
-def verdict_in_short(env: ProbeEnv) -> tuple[str, str]:
+def verdict_in_short(episode: Episode) -> tuple[str, str]:
     """The same as a title and a line below it."""
     import numpy as np
 
     from ...recognizer import pose_difference
 
-    belief, truth = env.belief, env.true_object
-    felt = f"{count(len(env.touches), 'probe')}, {count(len(env.contacts), 'contact')}"
+    belief, truth = episode.belief, episode.true_object
+    felt = f"{count(len(episode.touches), 'probe')}, {count(len(episode.contacts), 'contact')}"
     if belief is None:
         return "No probe touched the object", f"{felt}; it was {truth.name}"
     if belief.empty:
@@ -98,7 +98,7 @@ def verdict_in_short(env: ProbeEnv) -> tuple[str, str]:
         return f"Not unique: {left} left", f"{felt}; the heaviest is {best.object_name}"
     if best.object_name != truth.name:
         return f"It is {best.object_name}", f"{felt}; in truth it was {truth.name}"
-    error = pose_difference(truth, best.pose, env.T_world_object)
+    error = pose_difference(truth, best.pose, episode.T_world_object)
     found = f"found to {1e3 * error.translation:.2g} mm and {np.degrees(error.rotation):.2g}°"
     return f"It is {best.object_name}", f"{felt}; {found}"
 

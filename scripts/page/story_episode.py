@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...envs.pictures.episode import Episode
 from ...envs.pictures.episode_picture import RAY_LENGTH, last_stretch
 from ...envs.pictures.film_script import EpisodeRecord
 from ...envs.probe_env import ProbeEnv
@@ -39,15 +40,15 @@ def episode_stories(env: ProbeEnv, policy: Policy, seed: int) -> Iterator[Story]
         policy: what chooses the probes.
         seed: of the episode.
     """
-    env.reset(seed=seed)  # as `probes` will, to the bit
-    record = EpisodeRecord(env.episode, (), ("", ""))
+    _, info = env.reset(seed=seed)  # as `probes` will, to the bit
+    record = EpisodeRecord(Episode.of(env, info), (), ("", ""))
     moments = (_untouched(record),)
     yield _story(record, moments)
     for number, probed in enumerate(probes(env, policy, seed), 1):
         record = replace(record, probes=(*record.probes, probed))
         moments = (*moments, _moment(record, number))
         yield _story(record, moments)
-    yield _story(record, moments, verdict_in_short(env))
+    yield _story(record, moments, verdict_in_short(record.probes[-1]))
 
 
 def _story(

@@ -20,6 +20,7 @@ from palpate.envs.scene.scene import OBJECT, PLANE, ProbeScene
 from palpate.envs.sensors.noise import SensorNoise, uniform_in_ball, uniform_in_cone
 from palpate.envs.sensors.ray_sensor import RaySensor
 from palpate.envs.sensors.touch import ProbeCommand, triad
+from palpate.envs.truth import Truth
 from palpate.policies import make_policy
 from palpate.recognizer import Polyhedron, pose_difference
 from palpate.recognizer.models.rays import cast_rays
@@ -75,11 +76,12 @@ def test_what_balls_touch_is_recognised_with_the_truth_among_it(sensor):
     env = ProbeEnv(SMALL[1:], sensor=sensor, position_error=1e-4, normal_error=0.05)
     assert env.recognizer.features("simple-hand").edge_count > 0
     env.reset(seed=0)
-    env.step(np.random.default_rng(0).uniform(-1, 1, 3))
+    *_, info = env.step(np.random.default_rng(0).uniform(-1, 1, 3))
+    truth = Truth.of(env.library, info)
     assert len(env.contacts) == 3
     assert env.belief is not None
     errors = [
-        pose_difference(env.true_object, h.pose, env.T_world_object)
+        pose_difference(truth.model, h.pose, truth.T_world_object)
         for h in env.belief.hypotheses
         if h.determined
     ]
@@ -379,8 +381,9 @@ def test_an_object_that_rests_stands_on_the_plane_and_is_never_lost(placement):
     env = ProbeEnv(SMALL, placement=placement, max_probes=12)
     rng, felt = np.random.default_rng(11), 0
     for seed in range(4):
-        env.reset(seed=seed)
-        lowest = env.T_world_object.apply(env.true_object.vertices)[:, 2].min()
+        _, info = env.reset(seed=seed)
+        truth = Truth.of(env.library, info)
+        lowest = truth.T_world_object.apply(truth.model.vertices)[:, 2].min()
         assert abs(lowest) < 1e-9
         ended = False
         while not ended:
@@ -388,7 +391,7 @@ def test_an_object_that_rests_stands_on_the_plane_and_is_never_lost(placement):
             ended = unique or over
         if env.belief is not None:
             names = {hypothesis.object_name for hypothesis in env.belief.hypotheses}
-            assert env.true_object.name in names
+            assert truth.model.name in names
             felt += 1
     assert felt >= 3
 

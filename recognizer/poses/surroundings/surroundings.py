@@ -14,7 +14,7 @@ from ...models.features import Features
 from ...models.polyhedron import Polyhedron
 from ..fits.pose import Poses, kernel_contacts
 from ..fits.verdict_kernels import FEASIBLE, REJECTED, UNDECIDED
-from .cut_kernels import clear_poses
+from .clear_kernels import clear_poses
 from .repair import Bounds, repair
 from .slot_kernels import CUTS
 

@@ -13,6 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 from math import sin
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,7 @@ from ....envs.sensors.ball_sensor import BallSensor
 from ....envs.sensors.ball_touch import BallFelt
 from ....envs.sensors.finger_sensor import FingerSensor
 from ....envs.sensors.ray_sensor import RaySensor
+from ....envs.truth import Truth
 from ....recognizer import Polygon, Polyhedron
 from ....recognizer.models.rays import cast_rays
 from ..sweep_oracle import SweepOracle
@@ -77,22 +79,27 @@ class Way:
         return self.beyond <= self.allowed
 
 
-def judge_last_probe(env: ProbeEnv | PlanarProbeEnv, action: Floats) -> list[Way]:
+def judge_last_probe(
+    env: ProbeEnv | PlanarProbeEnv, action: Floats, info: dict[str, Any]
+) -> list[Way]:
     """The ways of the probe that an environment has just sent.
 
     Args:
         env: the environment; its object lies as it did when it was touched.
         action: (3,), in the plane (2,): what the probe was sent by.
+        info: what the environment returned.
     """
     inside = np.clip(np.asarray(action, np.float64), -1.0, 1.0)
     if isinstance(env, PlanarProbeEnv):
-        return [_judge_planar(env, inside)]
+        return [_judge_planar(env, inside, Truth.of(env.library, info))]
+    truth = Truth.of(env.library, info)
     if isinstance(env.sensors[0], RaySensor | BallSensor | FingerSensor):
-        return _judge_triad(env, inside)
-    return _judge_lines(env)
+        return _judge_triad(env, inside, truth)
+    return _judge_lines(env, truth)
 
 
-def _judge_triad(env: ProbeEnv, inside: Floats) -> list[Way]:
+def _judge_triad(env: ProbeEnv, inside: Floats, truth: Truth[Polyhedron]) -> list[Way]:
+    model, pose = truth.model, truth.T_world_object
     touch, sensor = env.touches[-1], env.sensors[0]
     meeting = np.append(inside[:2] * env.half_width, 0.0)
     radius = _radius(env)
@@ -106,11 +113,11 @@ def _judge_triad(env: ProbeEnv, inside: Floats) -> list[Way]:
         direction = (meeting - start) / np.linalg.norm(meeting - start)
         reached = float((end - start) @ direction)
         allowed = off if outcome == OBJECT else ROUNDING
-        first = _first_touch(env.true_object, env.T_world_object, start, direction, radius)
+        first = _first_touch(model, pose, start, direction, radius)
         if reached - first > allowed:
             # One that only grazes the object may have passed it by, as exact as the simulation is.
-            graze = _own_error(env, radius)
-            first = _grazing(env.true_object, env.T_world_object, start, direction, radius, graze)
+            graze = _own_error(env, model, radius)
+            first = _grazing(model, pose, start, direction, radius, graze)
         ways.append(Way(reached - first, allowed))
     return ways
 
@@ -121,12 +128,10 @@ def _radius(env: ProbeEnv) -> float:
     return env.sensors[0].radius if isinstance(env.sensors[0], BallSensor) else 0.0
 
 
-def _own_error(env: ProbeEnv, radius: float) -> float:
+def _own_error(env: ProbeEnv, model: Polyhedron, radius: float) -> float:
     """How far off the simulated surface may be, metres; for a tip, half the bound at the most."""
     # Single precision, see `scene.MESH_ROUNDING`, and parts that stray; no bound may be less.
-    return min(
-        1e-6 * env.true_object.diameter + radius / 200.0, env.sensors[0].noise.position_error
-    )
+    return min(1e-6 * model.diameter + radius / 200.0, env.sensors[0].noise.position_error)
 
 
 def _first_touch(
@@ -160,9 +165,9 @@ def _oracle(model: Polyhedron) -> SweepOracle:
     return SweepOracle(model)
 
 
-def _judge_lines(env: ProbeEnv) -> list[Way]:
+def _judge_lines(env: ProbeEnv, truth: Truth[Polyhedron]) -> list[Way]:
     """Of each swept line how deep it is inside the object at the most."""
-    paths, model, pose = env.touches[-1].free_space, env.true_object, env.T_world_object
+    paths, model, pose = env.touches[-1].free_space, truth.model, truth.T_world_object
     spans = np.linalg.norm(paths.ends - paths.starts, axis=1)
     rows = np.flatnonzero(spans > 0.0)
     directions = (paths.ends[rows] - paths.starts[rows]) / spans[rows, None]
@@ -180,12 +185,12 @@ def _judge_lines(env: ProbeEnv) -> list[Way]:
     return ways
 
 
-def _judge_planar(env: PlanarProbeEnv, inside: Floats) -> Way:
+def _judge_planar(env: PlanarProbeEnv, inside: Floats, truth: Truth[Polygon]) -> Way:
     touch = env.touches[-1]
     bearing = np.pi * inside[0]
     direction = np.array([np.cos(bearing), np.sin(bearing)])
     reached = float((touch.end_world - touch.start_world) @ direction)
-    first = _first_crossing(env.true_object, env.T_world_object, touch.start_world, direction)
+    first = _first_crossing(truth.model, truth.T_world_object, touch.start_world, direction)
     hit = touch.outcome == OBJECT
     allowed = float(touch.contacts.position_error[0]) if hit else 0.0
     return Way(reached - first, allowed + ROUNDING)

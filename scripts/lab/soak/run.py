@@ -125,7 +125,7 @@ class Soak:
             return
         found.seconds.append(process_time() - started)
         self._look(observation, reward, info)
-        self._judge(action)
+        self._judge(action, info)
         if terminated or truncated:
             self._left -= 1
             if self._left < 0:
@@ -152,8 +152,8 @@ class Soak:
         self.found.not_numbers += not all(np.isfinite(value).all() for value in values)
         self.found.outside += not self._env.observation_space.contains(observation)
 
-    def _judge(self, action: Any) -> None:
-        for way in judge_last_probe(self._env, np.asarray(action, np.float64)):
+    def _judge(self, action: Any, info: dict[str, Any]) -> None:
+        for way in judge_last_probe(self._env, np.asarray(action, np.float64), info):
             self.found.ways += 1
             self.found.beyond = max(self.found.beyond, way.beyond)
             if not way.sound:

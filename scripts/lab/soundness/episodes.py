@@ -16,6 +16,7 @@ import numpy as np
 
 from ....envs.planar.planar_env import PlanarProbeEnv
 from ....envs.probe_env import ProbeEnv
+from ....envs.truth import Truth
 from ....recognizer import Belief, SearchLimits
 from .case import Case
 from .truth import false_reports, pose_error, possible_features, true_hypotheses
@@ -120,25 +121,26 @@ def play(setting: str, seed: int, index: int, probes: int | None = None) -> Epis
     rng = np.random.default_rng(ways)
     most = probes or SENSORS[setting.partition("/")[0]]
     started = perf_counter()
-    env.reset(seed=int(placed.generate_state(1)[0]))
+    _, info = env.reset(seed=int(placed.generate_state(1)[0]))
     ended, short, lost = False, False, 0
     while not ended and len(env.touches) < most:
         before = env.belief
-        ended = env.step(rng.uniform(-1.0, 1.0, env.action_space.shape))[2]
+        action = rng.uniform(-1.0, 1.0, env.action_space.shape)
+        _, _, ended, _, info = env.step(action)
         if env.belief is not None and env.belief is not before:
-            complete, held = _verdict(env, env.belief)
+            complete, held = _verdict(_case(env, env.belief, info), env.belief)
             short |= not complete
             lost += complete and not held
     belief = env.belief
     return Episode(
         name=f"{setting}:{index}",
-        object_name=env.true_object.name,
+        object_name=info["truth"]["object"],
         lost=lost,
         short=short,
         unique=belief is not None and belief.unique,
         empty=belief is not None and belief.empty,
-        untrue=() if belief is None else _untrue(env, belief),
-        off=_off(env, belief),
+        untrue=() if belief is None else _untrue(_case(env, belief, info)),
+        off=0.0 if belief is None else _off(_case(env, belief, info), belief),
         probes=len(env.touches),
         contacts=len(env.contacts),
         seconds=perf_counter() - started,
@@ -160,28 +162,27 @@ def _environment(setting: str, gaussian: bool, free_space: bool) -> ProbeEnv | P
     )
 
 
-def _verdict(env: ProbeEnv | PlanarProbeEnv, belief: Belief) -> tuple[bool, bool]:
+def _verdict(case: Case, belief: Belief) -> tuple[bool, bool]:
     """Whether the search of the true object ran to its end, and whether the truth is held."""
-    case = _case(env, belief)
     held = bool(true_hypotheses(case, belief, possible_features(case)))
     searches = {search.object_name: search for search in belief.searches}
     return searches[case.model.name].complete, held
 
 
-def _untrue(env: ProbeEnv | PlanarProbeEnv, belief: Belief) -> tuple[str, ...]:
+def _untrue(case: Case) -> tuple[str, ...]:
     """What of all that was reported is not so."""
-    case = _case(env, belief)
     return tuple(false_reports(case, possible_features(case)))
 
 
-def _case(env: ProbeEnv | PlanarProbeEnv, belief: Belief) -> Case:
+def _case(env: ProbeEnv | PlanarProbeEnv, belief: Belief, info: dict[str, Any]) -> Case:
     """What a belief is about, as the campaign's judge takes it."""
     planar = isinstance(env, PlanarProbeEnv)
+    truth = Truth.of(env.library, info)
     return Case(
         name="",
-        model=env.true_object,
+        model=truth.model,
         recognizer=env.recognizer,
-        truth=env.T_world_object,
+        truth=truth.T_world_object,
         interpretation=np.zeros(len(belief.contacts), np.int32),
         contacts=belief.contacts,
         free_space=None if planar else belief.free_space,
@@ -189,17 +190,17 @@ def _case(env: ProbeEnv | PlanarProbeEnv, belief: Belief) -> Case:
     )
 
 
-def _off(env: ProbeEnv | PlanarProbeEnv, belief: Belief | None) -> float:
+def _off(case: Case, belief: Belief) -> float:
     """How far the only pose that is left is off, in pose tolerances; infinite of another object."""
-    if belief is None or not belief.unique:
+    if not belief.unique:
         return 0.0
     (hypothesis,) = belief.hypotheses
-    if hypothesis.object_name != env.true_object.name:
+    if hypothesis.object_name != case.model.name:
         return np.inf
-    turn, shift = pose_error(env.true_object, hypothesis.pose, env.T_world_object)
-    tolerance = env.recognizer.tolerance
+    turn, shift = pose_error(case.model, hypothesis.pose, case.truth)
+    tolerance = case.recognizer.tolerance
     error = float(belief.contacts.position_error.max())
-    most = tolerance.distance(env.true_object.diameter, error)
+    most = tolerance.distance(case.model.diameter, error)
     return max(turn / tolerance.rotation, shift / most)
 
 

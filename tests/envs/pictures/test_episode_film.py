@@ -12,6 +12,7 @@ import pytest
 
 from palpate.envs.pictures import episode_film
 from palpate.envs.pictures import view as picture_view
+from palpate.envs.pictures.episode import Episode
 from palpate.envs.pictures.episode_film import film_episode
 from palpate.envs.pictures.episode_picture import likeness_of
 from palpate.envs.pictures.film_approach import FEW_RAYS, approach
@@ -33,13 +34,13 @@ SIZE = 320, 240
 
 def record_of(**arguments) -> EpisodeRecord:
     env = ProbeEnv(object_name="complex-hand", **arguments)
-    env.reset(seed=45)
-    start = env.episode
+    _, info = env.reset(seed=45)
+    start = Episode.of(env, info)
     rng = np.random.default_rng(np.random.SeedSequence(45).spawn(1)[0])
     probes = []
     for _ in range(2):
-        env.step(rng.uniform(-1.0, 1.0, 3).astype(np.float32))
-        probes.append(env.episode)
+        *_, info = env.step(rng.uniform(-1.0, 1.0, 3).astype(np.float32))
+        probes.append(Episode.of(env, info))
     return EpisodeRecord(start, tuple(probes), ("It is complex-hand", "2 probes"))
 
 
@@ -198,10 +199,10 @@ def test_the_camera_stays_and_sees_an_object_that_is_moved(record):
 @pytest.mark.parametrize("placement", ["across", "resting"])
 def test_every_sensor_and_placement_has_a_film(sensor, placement):
     env = ProbeEnv(("simple-hand",), sensor=sensor, placement=placement, max_probes=1)
-    env.reset(seed=1)
-    start = env.episode
-    env.step(np.zeros(3))
-    record = EpisodeRecord(start, (env.episode,), ("", ""))
+    _, info = env.reset(seed=1)
+    start = Episode.of(env, info)
+    *_, info = env.step(np.zeros(3))
+    record = EpisodeRecord(start, (Episode.of(env, info),), ("", ""))
     shots = list(FilmScript(record, SIZE).shots())
     tips = [shot.scene.tips for shot in shots if shot.scene.tips]
     rays = len(env.touches[-1].outcomes)

@@ -15,6 +15,7 @@ from gymnasium.utils.env_checker import check_env
 import palpate.envs
 from palpate.envs.pictures import renderer, window
 from palpate.envs.pictures import view as picture_view
+from palpate.envs.pictures.episode import Episode
 from palpate.envs.pictures.episode_picture import episode_so_far
 from palpate.envs.probe_env import ProbeEnv
 
@@ -109,16 +110,17 @@ def test_rendering_survives_a_gl_library_that_kills(env, monkeypatch):
 
 
 def test_the_leading_rivals_are_ghosts_of_several_objects_but_never_the_truth(env):
-    env.reset(seed=0)
-    assert not episode_so_far(env.episode).ghosts
-    env.step(ACTION)
+    _, info = env.reset(seed=0)
+    assert not episode_so_far(Episode.of(env, info)).ghosts
+    *_, info = env.step(ACTION)
+    episode = Episode.of(env, info)
     assert env.belief is not None
-    ghosts = episode_so_far(env.episode).ghosts
+    ghosts = episode_so_far(episode).ghosts
     names = {hypothesis.object_name for hypothesis in env.belief.hypotheses}
     assert 0 < len(ghosts) <= 3
     assert len(names) == 2
     assert {ghost.label for ghost in ghosts} == names
-    truth = env.episode.T_world_object.apply(env.episode.true_object.vertices)
+    truth = episode.T_world_object.apply(episode.true_object.vertices)
     for ghost in ghosts:
         same = ghost.vertices_world.shape == truth.shape
         assert not (same and np.allclose(ghost.vertices_world, truth, atol=1e-3))
@@ -127,12 +129,13 @@ def test_the_leading_rivals_are_ghosts_of_several_objects_but_never_the_truth(en
 def test_of_many_rays_only_the_ends_that_met_nothing_are_drawn():
     env = ProbeEnv(("simple-hand",), sensor="range-grid")
     env.reset(seed=0)
-    env.step(np.zeros(3))
-    scene = episode_so_far(env.episode)
+    *_, info = env.step(np.zeros(3))
+    episode = Episode.of(env, info)
+    scene = episode_so_far(episode)
     assert len(env.contacts) == len(scene.contacts_world) > 3
     assert not scene.ray_hits.any()
     lengths = np.linalg.norm(scene.rays_world[:, 1] - scene.rays_world[:, 0], axis=1)
-    assert lengths.max() < 0.1 * env.episode.true_object.diameter
+    assert lengths.max() < 0.1 * episode.true_object.diameter
 
 
 def test_an_environment_that_renders_can_be_pickled_and_closed_twice(env):

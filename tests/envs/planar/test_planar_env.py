@@ -20,6 +20,7 @@ from palpate.envs.planar.library import load_outlines
 from palpate.envs.planar.planar_env import PlanarProbeEnv
 from palpate.envs.planar.rays import cast_planar_rays
 from palpate.envs.scene.scene import NOTHING, OBJECT
+from palpate.envs.truth import Truth
 from palpate.recognizer import Polygon
 
 gymnasium.register_envs(palpate.envs)
@@ -71,9 +72,15 @@ def test_a_pickled_environment_goes_on_where_it_was(env):
         assert all(np.array_equal(one[key], other[key]) for key in one)
 
 
+def truth_of(env) -> Truth:
+    """Where the outline lies: it stays there until the next reset."""
+    return Truth.of(env.library, env._info())
+
+
 def true_edges(env):
     """(n,) the edge that each contact so far was really on."""
-    outline_, pose = env.true_object, env.T_world_object
+    truth = truth_of(env)
+    outline_, pose = truth.model, truth.T_world_object
     rows = [touch for touch in env.touches if touch.outcome == OBJECT]
     starts = np.array([touch.start_world for touch in rows])
     approaches = np.array([touch.contacts.approaches[0] for touch in rows])
@@ -82,7 +89,8 @@ def true_edges(env):
 
 def is_held(env) -> bool:
     """Whether some hypothesis has the true interpretation and, if it fixes the pose, that too."""
-    truth, pose, edges = env.true_object, env.T_world_object, true_edges(env)
+    known, edges = truth_of(env), true_edges(env)
+    truth, pose = known.model, known.T_world_object
     centroid = np.append(truth.centroid, 0.0)
     for hypothesis in env.belief.hypotheses:
         if hypothesis.object_name != truth.name:
@@ -181,7 +189,8 @@ def test_outlines_start_where_the_description_says():
     far, angles, names = [], [], set()
     for seed in range(400):
         _, info = env.reset(seed=seed)
-        pose, model = env.T_world_object, env.true_object
+        truth = Truth.of(env.library, info)
+        pose, model = truth.T_world_object, truth.model
         far.append(np.linalg.norm(pose.apply(np.append(model.centroid, 0.0))) / env.half_width)
         assert np.array_equal(info["truth"]["pose"], pose.as_matrix())
         angles.append(pose.rotation.as_rotvec()[2])

@@ -13,6 +13,7 @@ from palpate.envs.probe_env import ProbeEnv
 from palpate.envs.scene.scene import OBJECT
 from palpate.envs.sensors.noise import SensorNoise
 from palpate.envs.sensors.ray_sensor import RaySensor
+from palpate.envs.truth import Truth
 from palpate.recognizer import EDGE, FACE, VERTEX, pose_difference
 
 gymnasium.register_envs(palpate.envs)
@@ -42,7 +43,7 @@ def test_contacts_of_all_sensors_make_one_belief():
     counts = []
     for number in range(6):
         choice = (-1.0, 0.0, 1.0)[number % 3]
-        observation, *_ = env.step(np.array([0.1 * number - 0.2, 0.1, 0.1 * number, choice]))
+        observation, *_, info = env.step(np.array([0.1 * number - 0.2, 0.1, 0.1 * number, choice]))
         assert env.observation_space.contains(observation)
         counts.append(len(env.touches[-1].contacts))
     assert len(env.contacts) == sum(counts)
@@ -50,8 +51,9 @@ def test_contacts_of_all_sensors_make_one_belief():
     assert set(env.contacts.kinds.tolist()) <= {FACE, EDGE, VERTEX}
     assert env.belief is not None
     best = env.belief.hypotheses[0]
-    assert best.object_name == env.true_object.name
-    error = pose_difference(env.true_object, best.pose, env.T_world_object)
+    truth = Truth.of(env.library, info)
+    assert best.object_name == truth.model.name
+    error = pose_difference(truth.model, best.pose, truth.T_world_object)
     assert error.rotation < 0.02
     assert error.translation < 1e-3
 
