@@ -12,13 +12,13 @@ BIN := $(VENV)/bin
 CREATED := $(VENV)/.created
 RUNTIME := $(VENV)/.runtime-installed
 DEV := $(VENV)/.dev-installed
-COMPILED := $(VENV)/.kernels-compiled
 PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .NOTPARALLEL:
-.PHONY: help run test check format format-check lint wheel types smoke bench bench-touch soundness soak assets clean
+.PHONY: help run test check check-versions format format-check lint wheel types smoke compiled \
+    bench bench-touch soundness soak assets clean
 
 help:
 	@echo "palpate: recognise polyhedra by touch"
@@ -26,6 +26,8 @@ help:
 	@echo "  make run          play one probing episode (sets up .venv the first time)"
 	@echo "  make test         run the tests"
 	@echo "  make check        format, lint, types, and the wheel tried outside the repository"
+	@echo "  make check-versions"
+	@echo "                    the tests on the oldest and newest Python, and on what palpate needs at least"
 	@echo "  make bench        measure the recogniser's speed and accuracy"
 	@echo "  make bench-touch  measure how exactly the sensors touch, and how fast"
 	@echo "  make soundness    try 20,000 random cases and more: is the true pose ever lost?"
@@ -37,14 +39,18 @@ help:
 	@echo "  ARGS='...'         is handed on, as in: make run ARGS='--object stapler --seed 7'"
 	@echo "  PYTHON=python3.12  chooses the Python that .venv is made with (3.11 or newer)"
 
-run: $(RUNTIME) $(COMPILED)
+run: $(RUNTIME) compiled
 	@$(BIN)/palpate episode $(ARGS)
 
-test: $(DEV) $(COMPILED)
+test: $(DEV) compiled
 	@$(BIN)/pytest -n auto --maxprocesses 8 -m "not slow" $(ARGS)
 
 check: format-check lint wheel types smoke
 	@echo "check: everything is in order"
+
+# What it runs on is told in pyproject.toml, [tool.tox]; a Python that isn't there is left out.
+check-versions: $(DEV)
+	@$(BIN)/tox run $(ARGS)
 
 format-check: $(DEV)
 	@echo "check: format"
@@ -63,10 +69,12 @@ wheel: $(DEV)
 	@mkdir -p build
 	@$(BIN)/pyproject-build --outdir build/dist . >build/wheel.log 2>&1 || { cat build/wheel.log; exit 1; }
 
-# pyright finds `palpate.…` in an unpacked wheel: no folder here has that name.
+# pyright finds `palpate.…` in an unpacked wheel, as no folder here has that name, and the lab, which
+# is in no wheel, beside it.
 types: wheel
 	@echo "check: types"
 	@$(PIP) install --no-deps --target build/types build/dist/*.whl
+	@cp -R scripts/lab build/types/palpate/scripts/lab
 	@PYRIGHT_PYTHON_IGNORE_WARNINGS=1 $(BIN)/pyright --pythonpath $(BIN)/python --warnings
 
 smoke: wheel
@@ -77,17 +85,17 @@ smoke: wheel
 	cd "$$away" && venv/bin/palpate --version && venv/bin/palpate episode --seed 1 --picture out.png && \
 	test -s out.png
 
-bench: $(DEV) $(COMPILED)
+bench: $(DEV) compiled
 	@$(BIN)/python -m palpate.scripts.lab.bench $(ARGS)
 
-bench-touch: $(DEV) $(COMPILED)
+bench-touch: $(DEV) compiled
 	@$(BIN)/python -m palpate.scripts.lab.bench.touch $(ARGS)
 
-soundness: $(DEV) $(COMPILED)
+soundness: $(DEV) compiled
 	@$(BIN)/python -m palpate.scripts.lab.soundness $(ARGS)
 	@$(BIN)/pytest -n auto --maxprocesses 8 -m slow
 
-soak: $(DEV) $(COMPILED)
+soak: $(DEV) compiled
 	@$(BIN)/python -m palpate.scripts.lab.soak $(ARGS)
 
 format: $(DEV)
@@ -122,14 +130,7 @@ $(DEV): pyproject.toml $(CREATED)
 	@$(PIP) install --editable '.[dev]'
 	@touch $(RUNTIME) $@
 
-# Compiling the kernels once, here, keeps the wait out of the first episode and the first test.
-# numba looks only at a kernel's own file to see whether its compiled code is stale, not at the
-# kernels it calls: so all are compiled anew when any has changed.
-$(COMPILED): $(wildcard recognizer/*_kernels.py policies/*_kernels.py envs/*_kernels.py) $(RUNTIME)
-	@echo "set-up: compiling the recogniser's kernels (once; three to five minutes)"
-	@rm -f recognizer/__pycache__/*_kernels.*.nb[ci] policies/__pycache__/*_kernels.*.nb[ci] \
-	    envs/__pycache__/*_kernels.*.nb[ci]
-	@$(BIN)/python -m palpate.recognizer.warm_up
-	@$(BIN)/python -m palpate.policies.warm_up
-	@$(BIN)/python -m palpate.envs.warm_up
-	@touch $@
+# Compiled once, here, so that neither the first episode nor the first test waits for it. Whether
+# that has been done, and for which kernels, palpate knows itself.
+compiled: $(RUNTIME)
+	@$(BIN)/palpate prepare >/dev/null

@@ -2,6 +2,7 @@
 
 The folders at the top of the repository are installed as ``palpate.<folder>``: an arrangement with
 one trap (a new folder works from a checkout and is missing in a wheel), which these tests close.
+Imports are walked down to the single module, those within functions and those for types too.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import importlib.metadata
 import subprocess
 import sys
 import tomllib
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -29,6 +31,22 @@ MAY_IMPORT = {
     "envs": {"envs", "assets", "recognizer"},
     "scripts": {"scripts", "policies", "envs", "assets", "recognizer"},
 }
+ROOMS = {
+    "recognizer": (
+        *("models", "contacts", "tables", "tree"),
+        *("poses.motions", "poses.proofs", "poses.fits", "poses.planar"),
+        *("poses.surroundings", "poses.search", "beliefs", "predict", "advice"),
+    ),
+    "envs": ("collision", "scene", "sensors", "pictures", "planar"),
+    "policies": ("outcomes",),
+    "scripts": (
+        *("benchmark", "report", "page"),
+        *("memo", "memo.errors", "memo.bounds", "memo.range", "commands", "lab"),
+    ),
+}
+"""Rooms of each folder in the order in which data flows: each imports those before it at most."""
+NOT_INSTALLED = ROOT / "scripts" / "lab"
+MOST_MODULES, MOST_LINES = 25, 350
 RECOGNIZER_STANDS_ON = {
     *("numpy", "scipy", "trimesh", "numba", "platformdirs"),
     *sys.stdlib_module_names,
@@ -83,8 +101,116 @@ def run_python(code: str) -> str:
     return finished.stdout + finished.stderr
 
 
+def installed_modules() -> dict[str, Path]:
+    """Every module of the five folders by its import name, a package by that of its folder."""
+    found = [path for folder in FOLDERS for path in modules_of(folder)]
+    return {import_name(path).removesuffix(".__init__"): path for path in found}
+
+
+def edges_between(modules: dict[str, Path]) -> dict[str, set[str]]:
+    """Which module imports which."""
+    edges: dict[str, set[str]] = {}
+    for name, path in modules.items():
+        inside = f"{name}.__init__" if path.stem == "__init__" else name
+        found = {
+            _module_of(target, modules)
+            for target in imports_of(path.read_text(encoding="utf-8"), inside)
+        }
+        edges[name] = {target for target in found if target not in (None, name)}
+    return edges
+
+
+def _module_of(name: str, modules: dict[str, Path]) -> str | None:
+    while name and name not in modules:
+        name = name.rpartition(".")[0]
+    return name or None
+
+
+def circles(edges: dict[str, set[str]]) -> list[list[str]]:
+    """What leads back to itself, by taking away whatever imports nothing that is left."""
+    left = {name: set(targets) for name, targets in edges.items()}
+    while ends := {name for name, targets in left.items() if not targets & set(left)}:
+        left = {name: targets for name, targets in left.items() if name not in ends}
+    return [sorted(left)] if left else []
+
+
+def room_of(module: str) -> str:
+    """The innermost room that a module is in; a module in none is one of its own."""
+    _, folder, *rest = module.split(".")
+    rooms = sorted(ROOMS.get(folder, ()), key=len, reverse=True)
+    inside = ".".join(rest)
+    found = [room for room in rooms if inside == room or inside.startswith(f"{room}.")]
+    return f"palpate.{folder}.{found[0]}" if found else module
+
+
+def test_no_import_leads_back_to_its_module():
+    assert circles(edges_between(installed_modules())) == []
+
+
+def test_no_import_leads_back_to_its_room():
+    rooms: dict[str, set[str]] = {}
+    for module, targets in edges_between(installed_modules()).items():
+        room = room_of(module)
+        rooms.setdefault(room, set()).update({room_of(target) for target in targets} - {room})
+    assert circles(rooms) == []
+
+
+def test_every_room_imports_only_rooms_before_it():
+    found = []
+    for module, targets in edges_between(installed_modules()).items():
+        folder = module.split(".")[1]
+        order = [f"palpate.{folder}.{room}" for room in ROOMS.get(folder, ())]
+        for target in targets:
+            here, there = room_of(module), room_of(target)
+            if here in order and there in order and order.index(there) > order.index(here):
+                found.append(f"{module} imports {target}")
+    assert found == []
+
+
+def test_a_circle_is_noticed():
+    assert circles({"a": {"b"}, "b": {"c"}, "c": {"b"}, "d": set()}) == [["a", "b", "c"]]
+    assert circles({"a": {"b"}, "b": {"c"}, "c": set()}) == []
+
+
+def test_every_subfolder_is_a_room():
+    for folder, rooms in ROOMS.items():
+        inside = {import_name(path.parent) for path in modules_of(folder)} - {f"palpate.{folder}"}
+        named = {f"palpate.{folder}.{room}" for room in rooms}
+        outer = {f"palpate.{folder}.{room.rpartition('.')[0]}" for room in rooms if "." in room}
+        assert {name for name in inside if not name.startswith("palpate.scripts.lab.")} == (
+            named | outer
+        )
+
+
+def test_no_folder_has_to_be_searched_and_no_module_is_two():
+    modules = [path for folder in FOLDERS for path in modules_of(folder)]
+    folders = Counter(path.parent for path in modules if path.stem != "__init__")
+    assert {str(path): n for path, n in folders.items() if n > MOST_MODULES} == {}
+    lines = {str(path): len(path.read_text(encoding="utf-8").splitlines()) for path in modules}
+    assert {path: count for path, count in lines.items() if count > MOST_LINES} == {}
+
+
+def test_a_kernel_calls_kernels_alone():
+    # What makes compiled code stale is the text of kernels, see `kernel_store`.
+    edges = edges_between(installed_modules())
+    allowed = "palpate.recognizer.compiling"
+    found = [
+        f"{module} imports {target}"
+        for module, targets in edges.items()
+        if module.endswith("_kernels")
+        for target in targets
+        if not target.endswith("_kernels") and target != allowed
+    ]
+    assert found == []
+
+
 def test_every_folder_of_code_or_data_is_installed():
-    on_disk = {path.parent for folder in FOLDERS for path in files_of(folder)}
+    on_disk = {
+        path.parent
+        for folder in FOLDERS
+        for path in files_of(folder)
+        if not path.is_relative_to(NOT_INSTALLED)
+    }
     assert {import_name(path) for path in on_disk} == set(SETUPTOOLS["packages"])
 
 
@@ -107,6 +233,49 @@ def test_every_folder_says_it_is_typed():
 def test_installed_version_is_the_one_written_down():
     installed = importlib.metadata.version("palpate")
     assert installed == PROJECT["project"]["version"], "install again: rm -rf .venv, then make test"
+
+
+def test_nothing_that_is_installed_imports_the_lab():
+    found = [
+        f"{module} imports {target}"
+        for module, targets in edges_between(installed_modules()).items()
+        for target in targets
+        if ".lab" in target and ".lab" not in module
+    ]
+    assert found == []
+
+
+PUBLIC = {
+    "recognizer": """ANYTHING EDGE FACE VERTEX Belief Constraints ContactKind Contacts FeltFile
+        Finding FreeSpace Hypothesis PairTables Polygon Polyhedron PoseDifference PoseSamples
+        PoseTolerance Predictions ProbeSpace Recognizer Search SearchLimits SupportPlane TriadRays
+        diagnose load_folder pose_difference predict read_contacts sample_belief""",
+    "envs": "ENV_ID FINGER_ENV_ID PLANAR_ENV_ID REST_ENV_ID",
+    "policies": """GOALS POLICY_NAMES DecisionRegion Goal Grid Information Lookahead Minimax Pairs
+        Policy Pruning RandomHit RandomProbe Rate Refine SafeRegion Separation Task make_policy""",
+    "assets": "STAND_IN_NAMES mesh_path",
+}
+
+
+@pytest.mark.parametrize("folder", PUBLIC)
+def test_what_users_import_is_there(folder):
+    module = importlib.import_module(f"palpate.{folder}")
+    assert [name for name in PUBLIC[folder].split() if not hasattr(module, name)] == []
+    assert set(PUBLIC[folder].split()) == set(getattr(module, "__all__", PUBLIC[folder].split()))
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "palpate.envs.probe_env:ProbeEnv",
+        "palpate.policies.session:Session",
+        "palpate.scripts.cli:main",
+        "palpate.assets.memo:__doc__",
+    ],
+)
+def test_documented_places_hold(name):
+    module, _, attribute = name.partition(":")
+    assert hasattr(importlib.import_module(module), attribute)
 
 
 def test_data_flows_one_way():
