@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from helpers.checkout import TESTS
 from helpers.made_up_rows import made_up_row, small
 
 from palpate.scripts.benchmark.store import RowStore
@@ -60,7 +61,8 @@ cluster.shutdown()
 
 
 def run(program: str, folder: Path) -> None:
-    path = os.pathsep.join([str(Path(__file__).resolve().parents[2]), *sys.path])
+    # Ray's own processes read the path from here.
+    path = os.pathsep.join([str(TESTS), *sys.path])
     told = subprocess.run(
         [sys.executable, "-c", program, str(folder)],
         env={**os.environ, "PYTHONPATH": path, "RAY_USAGE_STATS_ENABLED": "0"},
