@@ -56,6 +56,11 @@ def kernel_folder() -> Path | None:
     return next((place for place in places if _writable(place)), None)
 
 
+def is_outdated() -> bool:
+    """Whether kernels have been changed since this process first looked at them."""
+    return stamp.__wrapped__() != stamp()
+
+
 def is_prepared() -> bool:
     """Whether all kernels have been compiled for this processor, as they are now."""
     folder = kernel_folder()

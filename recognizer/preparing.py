@@ -17,7 +17,15 @@ from contextlib import contextmanager
 from importlib import import_module
 from pathlib import Path
 
-from .kernel_store import PREPARED, announcement, is_prepared, kernel_folder, mark, packages
+from .kernel_store import (
+    PREPARED,
+    announcement,
+    is_outdated,
+    is_prepared,
+    kernel_folder,
+    mark,
+    packages,
+)
 
 WORKERS = 2
 """Processes. More would compile what others need too."""
@@ -38,13 +46,14 @@ def prepare() -> bool:
     keeps what was finished.
 
     Returns:
-        Whether there was anything to do; False too where nothing can be kept.
+        Whether there was anything to do; False too where nothing can be kept, or where kernels
+        were changed since this process started, which others would compile as they are now.
 
     Raises:
         RuntimeError: a process that compiles failed.
     """
     folder = kernel_folder()
-    if is_prepared() or folder is None:
+    if folder is None or is_prepared() or is_outdated():
         return False
     if TOLD not in os.environ:
         print(announcement(), file=sys.stderr, flush=True)
@@ -69,7 +78,7 @@ def _alone(folder: Path) -> Iterator[None]:
     except ImportError:
         yield
         return
-    with open(folder / "lock", "a") as file:
+    with open(folder.parent / "lock", "a") as file:
         fcntl.flock(file, fcntl.LOCK_EX)
         yield
 

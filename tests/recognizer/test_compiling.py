@@ -76,9 +76,11 @@ def start(package: Path, code: str = CALL, **environment: str) -> subprocess.Pop
     return subprocess.Popen(
         [sys.executable, "-P", "-c", code],
         env=given,
+        stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
+        cwd=package,
         start_new_session=True,
     )
 
@@ -110,6 +112,20 @@ def test_a_kernel_is_compiled_anew_when_one_that_it_calls_was_changed(small):
     assert out == "100.0 1"
     assert "once" in err
     assert kept(small) == before, "what is stale is removed"
+
+
+def test_a_process_that_started_before_a_change_goes_on_as_it_started(small):
+    waits = CALL.replace("print(", "open('started', 'w').close();input();print(")
+    process = start(small, waits)
+    while not (small / "started").exists():
+        assert process.poll() is None, process.communicate()[1]
+        time.sleep(0.05)
+    (small / "inner_kernels.py").write_text(CALLEE.replace("FACTOR", "20.0"))
+    assert run(small)[0] == "100.0 1"
+    after = kept(small)
+    assert process.communicate("\n", timeout=120)[0].split()[0] == "50.0"
+    assert kept(small) >= after
+    assert run(small) == ("100.0 1", "")
 
 
 def test_constants_do_not_have_a_callee_compiled_again(small):

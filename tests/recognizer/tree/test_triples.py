@@ -29,6 +29,7 @@ from palpate.recognizer.models.polygon import Polygon
 from palpate.recognizer.tables import triples
 from palpate.recognizer.tables.planar_ranges import PlanarTables
 from palpate.recognizer.tables.triples import TripleTables
+from palpate.recognizer.tree import triple_tree
 from palpate.recognizer.tree.tree import InterpretationTree, prune, root
 
 MODELS = (*SOLIDS, *STAND_IN_NAMES)
@@ -132,7 +133,7 @@ def test_leaves_do_not_depend_on_order_blocks_stages_or_memory(choice, monkeypat
         prefixes, complete = tree.extend(prefixes, stop, 1_000_000)
         assert complete
     assert as_set(prefixes) == whole
-    monkeypatch.setattr(triples, "BLOCK", 100)
+    monkeypatch.setattr(triple_tree, "BLOCK", 100)
     monkeypatch.setattr(triples, "FIRST_SLOTS", 64)
     monkeypatch.setattr(triples, "MOST_SLOTS", 512)
     forgetful = PairTables.of(model(name))
