@@ -119,7 +119,7 @@ class FreeBody:
     def pose(self) -> RigidTransform:
         """Where the simulation has it: at the start of its last step, as its contacts are."""
         rotation = Rotation.from_quat(self._data.xquat[self._body], scalar_first=True)
-        origin = self._data.xpos[self._body] - rotation.apply(self._centroid)
+        origin = self._data.xpos[self._body] - rotation.apply(self._centroid.copy())
         return RigidTransform.from_components(origin, rotation)
 
     def come_to_rest(self) -> bool:

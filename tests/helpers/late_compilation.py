@@ -7,15 +7,15 @@ from pathlib import Path
 
 import numpy as np
 from helpers.command import run_here
-from numba.core.dispatcher import Dispatcher
 from oracles.outlines import entry, feel
 from oracles.solids import model, random_contacts, random_pose
 
-from palpate.envs.warm_up import warm_up as warm_up_sensors
-from palpate.policies.warm_up import warm_up as warm_up_policies
+from palpate.envs import warm_up as envs_parts
+from palpate.policies import warm_up as policies_parts
 from palpate.recognizer import Contacts, Polygon, Polyhedron, Recognizer
-from palpate.recognizer.tree.tree.tree import prune
-from palpate.recognizer.warm_up import warm_up as warm_up_recognizer
+from palpate.recognizer import warm_up as recognizer_parts
+from palpate.recognizer.compiling import Kernel
+from palpate.recognizer.tree.tree import prune
 
 EPISODES = (
     "",
@@ -33,7 +33,7 @@ def compiled() -> set[str]:
         for module in list(sys.modules.values())
         if module.__name__.startswith("palpate.") and module.__name__.endswith("_kernels")
         for name, value in vars(module).items()
-        if isinstance(value, Dispatcher)
+        if isinstance(value, Kernel)
         for signature in value.signatures
     }
 
@@ -51,7 +51,7 @@ def recognize(shape: Polyhedron | Polygon, rng: np.random.Generator) -> None:
         belief = recognizer.recognize(contacts)
         for hypothesis in belief.hypotheses[:3]:
             recognizer.sample_poses(hypothesis, contacts)
-        belief.update(contacts[:1])
+        recognizer.update(belief, contacts[:1])
 
 
 def recognize_otherwise(solid: Polyhedron, rng: np.random.Generator) -> None:
@@ -74,9 +74,9 @@ def touch(shape: Polyhedron | Polygon, count: int, rng: np.random.Generator) -> 
 
 
 if __name__ == "__main__":
-    warm_up_recognizer()
-    warm_up_policies()
-    warm_up_sensors()
+    for module in (recognizer_parts, policies_parts, envs_parts):
+        for part in module.PARTS:
+            part()
     before = compiled()
     play_episodes()
     rng = np.random.default_rng(0)
