@@ -8,12 +8,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import combinations
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
-
-from palpate.recognizer import Polyhedron
 
 Floats = NDArray[np.float64]
 
@@ -21,6 +20,20 @@ COPLANAR = 1e-6
 """Share of the diameter within which corners are on one plane, and a centre above an edge."""
 CHUNK = 100_000
 """Pairs of a point and a triangle that are looked at at once, so that they fit a cache."""
+
+
+class Solid(Protocol):
+    """What is asked of a model of palpate's, whatever name it was imported by."""
+
+    @property
+    def vertices(self) -> Floats:
+        """(v, 3) metres."""
+        ...
+
+    @property
+    def triangles(self) -> NDArray[np.integer]:
+        """(t, 3) rows of `vertices`, counter-clockwise from outside."""
+        ...
 
 
 def angle_between(a: Floats, b: Floats) -> Floats:
@@ -89,7 +102,7 @@ def windings(triangles: Floats, points: Floats) -> Floats:
     return np.arctan2(volumes, beside).sum(axis=1) / (2.0 * np.pi)
 
 
-def signed_distances(model: Polyhedron, points: Floats) -> Floats:
+def signed_distances(model: Solid, points: Floats) -> Floats:
     """(p,) distances of points (p, 3) from a solid's surface, object frame, negative inside it."""
     triangles = model.vertices[model.triangles]
     found = np.empty(len(points))
@@ -103,7 +116,7 @@ def signed_distances(model: Polyhedron, points: Floats) -> Floats:
 
 
 def nearest_on_paths(
-    model: Polyhedron, starts: Floats, ends: Floats, clearances: Floats, grains: Floats
+    model: Solid, starts: Floats, ends: Floats, clearances: Floats, grains: Floats
 ) -> Floats:
     """(m,) the least signed distance from a solid that is found along straight paths.
 
@@ -127,6 +140,14 @@ def nearest_on_paths(
     return least
 
 
+def centre_of_volume(triangles: Floats) -> Floats:
+    """(3,) the centre of what a closed surface (t, 3, 3) holds: of the cones over its triangles."""
+    apex = triangles.mean(axis=(0, 1))
+    arms = triangles - apex
+    volumes = np.linalg.det(arms)
+    return apex + 0.75 * (volumes @ arms.mean(axis=1)) / volumes.sum()
+
+
 @dataclass(frozen=True, eq=False)
 class Footing:
     """A face of a solid's convex hull that it can stand on."""
@@ -137,24 +158,25 @@ class Footing:
     """(k, 3) object frame, metres."""
 
 
-def footings(model: Polyhedron, slack: float = 0.0) -> list[Footing]:
+def footings(model: Solid, slack: float = 0.0) -> list[Footing]:
     """The faces of a solid's convex hull that have its centre of volume above them.
 
     Args:
         model: the solid.
         slack: by how much the centre may be beside a face, metres.
     """
-    corners = model.vertices
+    corners, centre = model.vertices, centre_of_volume(model.vertices[model.triangles])
+    coplanar = COPLANAR * np.linalg.norm(corners[:, None] - corners, axis=2).max()
     found: list[Footing] = []
     for normal in ConvexHull(corners).equations[:, :3]:
         if any(normal @ known.normal > 1.0 - 1e-9 for known in found):
             continue
         along = corners @ normal
-        on_it = corners[along > along.max() - COPLANAR * model.diameter]
+        on_it = corners[along > along.max() - coplanar]
         u = np.cross(normal, np.eye(3)[np.abs(normal).argmin()])
         u /= np.linalg.norm(u)
         flat = np.stack([u, np.cross(normal, u)])
         hull = ConvexHull(on_it @ flat.T)
-        if (hull.equations @ np.append(flat @ model.centroid, 1.0) <= slack).all():
+        if (hull.equations @ np.append(flat @ centre, 1.0) <= slack).all():
             found.append(Footing(normal, on_it[hull.vertices]))
     return found

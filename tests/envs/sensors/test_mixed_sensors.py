@@ -40,7 +40,7 @@ def test_contacts_of_all_sensors_make_one_belief():
         normal_error=0.1,
     )
     env.reset(seed=3)
-    counts = []
+    counts, info = [], {}
     for number in range(6):
         choice = (-1.0, 0.0, 1.0)[number % 3]
         observation, *_, info = env.step(np.array([0.1 * number - 0.2, 0.1, 0.1 * number, choice]))

@@ -30,7 +30,9 @@ def as_arrays(pose: RigidTransform) -> tuple[Floats, Floats]:
     return pose.rotation.as_matrix(), np.array(pose.translation)
 
 
-def moved(rng: np.random.Generator, bounds: Bounds, pose: RigidTransform, by: float):
+def moved(
+    rng: np.random.Generator, bounds: Bounds, pose: RigidTransform, by: float
+) -> tuple[Floats, Floats]:
     """A pose off by so many bounds on a position, in some direction."""
     step = rng.normal(size=6)
     step *= by * bounds.contacts[2].max() / np.linalg.norm(step)

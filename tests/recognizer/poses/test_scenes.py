@@ -17,9 +17,8 @@ def judged(scene: Scene, rng: np.random.Generator, checked: int = 3) -> tuple[li
     model = scene.model
     features = scene.recognizer.features(model.name)
     given = {"free_space": scene.free_space, "support": scene.support}
-    known = given | {"features": features}
     # The scene itself is within all bounds, or it would prove nothing.
-    wrong = broken(model, scene.pose, scene.contacts, scene.faces, **known)
+    wrong = broken(model, scene.pose, scene.contacts, scene.faces, features=features, **given)
     wrong = [f"the scene breaks {what}" for what in wrong]
     belief = scene.recognizer.recognize(scene.contacts, **given)
     if belief.complete and holder(belief, scene.faces) is None:
@@ -27,7 +26,7 @@ def judged(scene: Scene, rng: np.random.Generator, checked: int = 3) -> tuple[li
     proven = [hypothesis for hypothesis in belief.hypotheses if hypothesis.proven]
     for row in rng.permutation(len(proven))[:checked]:
         pose, faces = proven[row].pose, proven[row].interpretations[0]
-        lacks = broken(model, pose, scene.contacts, faces, **known)
+        lacks = broken(model, pose, scene.contacts, faces, features=features, **given)
         wrong += [f"a proven pose breaks {what}" for what in lacks]
     counts = Counter(
         scenes=1,
