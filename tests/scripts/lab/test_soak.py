@@ -34,21 +34,21 @@ def made(name: str) -> Any:
     return SETTINGS[name].make(cut_short=True)
 
 
-def touching(env) -> Any:
-    """An action of which a way has ended on the object, and that way's number."""
+def touching(env) -> tuple[np.ndarray, dict[str, Any]]:
+    """An action of which a way has ended on the object, and what the environment told of it."""
     rng = np.random.default_rng(1)
     env.reset(seed=3)
     while True:
         action = 0.3 * rng.uniform(-1.0, 1.0, env.action_space.shape)
-        env.step(action)
+        *_, info = env.step(action)
         if len(env.touches[-1].contacts):
-            return action
+            return action, info
 
 
 def say(env, touch) -> None:
     """Have the last probe have reported something else."""
     touches = (*env.touches[:-1], touch)
-    env._evidence = replace(env._evidence, touches=touches)
+    env._known = replace(env._known, evidence=replace(env._known.evidence, touches=touches))
 
 
 def test_the_commands_help_loads_nothing_heavy():
@@ -108,8 +108,8 @@ def test_what_is_no_action_is_refused_and_leaves_no_trace(kind, make):
 @pytest.mark.parametrize("name", ["probe", "ball", "finger", "planar"])
 def test_a_way_through_the_object_is_found(name):
     env = made(name)
-    action = touching(env)
-    ways = judge_last_probe(env, action)
+    action, info = touching(env)
+    ways = judge_last_probe(env, action, info)
     assert all(way.sound for way in ways)
     touch = env.touches[-1]
     hits = [0]
@@ -120,7 +120,7 @@ def test_a_way_through_the_object_is_found(name):
         farther = 1.01 * touch.ends_world - 0.01 * touch.starts_world
         say(env, replace(touch, ends_world=farther))
         hits = np.flatnonzero(touch.outcomes == OBJECT).tolist()
-    worse = judge_last_probe(env, action)
+    worse = judge_last_probe(env, action, info)
     for row in hits:
         assert worse[row].beyond > ways[row].beyond + 5e-4
         assert not worse[row].sound
@@ -128,24 +128,24 @@ def test_a_way_through_the_object_is_found(name):
 
 def test_a_ray_that_says_it_met_nothing_is_not_believed():
     env = made("probe")
-    action = touching(env)
+    action, info = touching(env)
     touch = env.touches[-1]
     meeting = np.append(action[:2] * env.half_width, 0.0)
     through = np.tile(meeting, (RAYS, 1))
     say(env, replace(touch, ends_world=through, outcomes=np.full(RAYS, PLANE, np.int8)))
-    assert not all(way.sound for way in judge_last_probe(env, action))
+    assert not all(way.sound for way in judge_last_probe(env, action, info))
 
 
 @pytest.mark.parametrize("name", ["range", "range-grid"])
 def test_a_line_of_sight_through_the_object_is_found(name):
     env = made(name)
-    action = touching(env)
-    assert all(way.sound for way in judge_last_probe(env, action))
+    action, info = touching(env)
+    assert all(way.sound for way in judge_last_probe(env, action, info))
     touch = env.touches[-1]
     paths = touch.free_space
     farther = 1.02 * paths.ends - 0.02 * paths.starts
     say(env, replace(touch, free_space=FreeSpace(paths.starts, farther, error=paths.error)))
-    assert not all(way.sound for way in judge_last_probe(env, action))
+    assert not all(way.sound for way in judge_last_probe(env, action, info))
 
 
 def test_a_watched_finger_touches_as_any_other():
