@@ -97,7 +97,7 @@ def test_the_document_is_in_the_units_of_the_files_and_agrees_with_rays(folder):
         assert report["after"][0] == pytest.approx(depth, abs=near)
         assert np.array(report["point"]) == pytest.approx(start + depth * direction, abs=near)
         face = model("l-block").triangle_faces[triangle]
-        normal = POSE.rotation.apply(model("l-block").normals[face])
+        normal = POSE.rotation.apply(model("l-block").normals[face].copy())
         assert np.array(report["normal"]) @ normal > 0.9999
         (rival,) = report["rivals"]
         assert rival["object"] == "l-block"
