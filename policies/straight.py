@@ -63,7 +63,9 @@ class Region:
         low, high = np.full(3, np.inf), np.full(3, -np.inf)
         turns = Rotation.from_quat(samples.rotations)
         for row, number in enumerate(samples.objects):
-            corners = turns[row].apply(samples.models[number].vertices) + samples.positions[row]
+            corners = (
+                turns[row].apply(samples.models[number].vertices.copy()) + samples.positions[row]
+            )
             room = margin + 3.0 * samples.position_spread[row]
             low = np.minimum(low, corners.min(axis=0) - room)
             high = np.maximum(high, corners.max(axis=0) + room)

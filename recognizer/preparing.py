@@ -15,6 +15,7 @@ import tempfile
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from importlib import import_module
+from itertools import zip_longest
 from pathlib import Path
 
 from .kernel_store import (
@@ -89,18 +90,22 @@ def _compile() -> None:
         COMPILES_HERE: "1",
         "PYTHONPATH": os.pathsep.join(path for path in sys.path if path),
     }
-    command = "from palpate.recognizer.preparing import compile_share; compile_share({})"
     reading, writing = os.pipe()
-    with tempfile.TemporaryFile("w+") as errors, open(reading, encoding="utf-8") as lines:
+    with (
+        tempfile.TemporaryFile("w+") as errors,
+        tempfile.TemporaryDirectory() as claims,
+        open(reading, encoding="utf-8") as lines,
+    ):
+        code = f"from palpate.recognizer import preparing; preparing.compile_parts({claims!r})"
         workers = [
             subprocess.Popen(
-                [sys.executable, "-P", "-c", command.format(number)],
+                [sys.executable, "-P", "-c", code],
                 env=environment,
                 stdin=subprocess.DEVNULL,
                 stdout=writing,
                 stderr=errors,
             )
-            for number in range(WORKERS)
+            for _ in range(WORKERS)
         ]
         os.close(writing)
         try:
@@ -134,8 +139,17 @@ def tell_compiled(name: str) -> None:
         print(name, flush=True)
 
 
-def compile_share(number: int) -> None:
-    """Compile what one of the processes is to compile."""
-    parts = [part for name in packages() for part in import_module(f"palpate.{name}.warm_up").PARTS]
-    for part in parts[number::WORKERS]:
+def compile_parts(claims: str) -> None:
+    """Compile parts that no other process has claimed, until none is left.
+
+    Args:
+        claims: a folder in which claims are made.
+    """
+    parts = [import_module(f"palpate.{name}.warm_up").PARTS for name in packages()]
+    # The first of each package, then the second: the longest ones begin together.
+    for number, part in enumerate(part for row in zip_longest(*parts) for part in row if part):
+        try:
+            Path(claims, str(number)).touch(exist_ok=False)
+        except FileExistsError:
+            continue
         part()

@@ -7,12 +7,14 @@ from scipy.spatial.transform import RigidTransform
 
 from .contacts.contacts import Contacts
 from .contacts.free_space import FreeSpace
-from .contacts.support import SupportPlane
+from .contacts.support import SupportPlane, stable_faces
+from .models.features import face_features
 from .models.polygon import Polygon
 from .models.polyhedron import Polyhedron
 from .models.rays import RayHits, cast_rays
+from .poses.fits.pose import Poses
 from .poses.surroundings.repair import repair
-from .poses.surroundings.surroundings import Surroundings, bounds_of
+from .poses.surroundings.surroundings import Surroundings, bounds_of, clear
 from .predict.pose_samples import sample_belief
 from .predict.prediction import predict
 from .predict.probes import ProbeSpace
@@ -36,18 +38,20 @@ def recognize_solids() -> None:
     predict(sample_belief(belief, [_box()], 64), ProbeSpace(1.0, 5.0).rays(np.zeros((1, 3))))
 
 
-def recognize_in_surroundings() -> None:
-    """Free paths and a floor that the box stands on, and a pose to repair."""
-    contacts, recognizer = _few(), Recognizer([_box()])
+def hold_against_surroundings() -> None:
+    """A pose beside free paths and a floor, and one to repair; without a search, which is another
+    part's."""
+    box, hits = _box(), _hits(5.0 * np.eye(3), -np.eye(3))
+    features, contacts = face_features(box), _few()
     paths = FreeSpace(5.0 * np.eye(3), contacts.positions, error=0.01)
-    floor = SupportPlane(height=-1.5, error=0.01, resting=True)
-    best = recognizer.recognize(contacts, free_space=paths, support=floor).hypotheses[0]
-    surroundings = Surroundings.of(paths, floor)
-    bounds = bounds_of(_box(), recognizer.features("box"), contacts, surroundings)
+    surroundings = Surroundings.of(paths, SupportPlane(height=-1.5, error=0.01, resting=True))
+    faces = hits.faces.astype(np.int32)[None]
+    one, nothing = np.eye(3)[None], np.zeros((1, 3))
+    poses = Poses(faces, one, nothing, np.zeros(1), np.eye(6)[None], np.ones(1, bool))
+    clear(box, features, poses, contacts, surroundings, stable_faces(box)[0])
+    bounds = bounds_of(box, features, contacts, surroundings)
     # A little off, so that there is something to repair.
-    aside = best.pose.translation + [0.02, 0.0, 0.0]
-    faces = best.interpretations[0].astype(np.int64)
-    repair(faces, best.pose.rotation.as_matrix(), aside, bounds, steps=1)
+    repair(hits.faces, np.eye(3), np.array([0.02, 0.0, 0.0]), bounds, steps=1)
 
 
 def prune_alone() -> None:
@@ -65,8 +69,8 @@ def recognize_outlines() -> None:
     recognizer.sample_poses(recognizer.recognize(flat).hypotheses[0], flat, 4)
 
 
-PARTS = (recognize_solids, recognize_outlines, prune_alone, recognize_in_surroundings)
-"""What can be compiled independently of all else."""
+PARTS = (recognize_solids, recognize_outlines, prune_alone, hold_against_surroundings)
+"""What can be compiled independently: the longest first, what shares most with it last."""
 
 
 def _box() -> Polyhedron:
