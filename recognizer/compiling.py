@@ -10,6 +10,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from contextlib import suppress
+from functools import cached_property
 from typing import Any
 
 from numba.core import types
@@ -18,7 +20,7 @@ from numba.core.options import DefaultOptions
 from numba.core.registry import CPUDispatcher
 
 from .kernel_store import kernel_folder, stamp
-from .linking import PartCompiler, WholeCompiler, rebuilt_part
+from .linking import PartCompiler, WholeCompiler, rebuilt
 from .preparing import COMPILES_HERE, prepare, tell_compiled
 
 
@@ -43,48 +45,29 @@ class _Locator(_CacheLocator):
         return cls(py_func, py_file)
 
 
-class _PartLocator(_Locator):
-    """Says where one kernel is kept as a part of others."""
-
-    def get_disambiguator(self) -> str:
-        return f"{self._place}-part"
-
-
-class _Whole(CompileResultCacheImpl):
+class _Kept(CompileResultCacheImpl):
     _locator_classes = [_Locator]  # noqa: RUF012
 
-
-class _Part(CompileResultCacheImpl):
-    _locator_classes = [_PartLocator]  # noqa: RUF012
-
     def rebuild(self, target_context: Any, payload: Any) -> Any:
-        return rebuilt_part(target_context, payload)
+        return rebuilt(target_context, payload)
 
 
-class _PartCache(FunctionCache):
-    """What is kept of one kernel as a part."""
+class _Cache(FunctionCache):
+    """What is kept of one kernel; the first one that is missing has all of them compiled."""
 
-    _impl_class = _Part
-
-    def save_overload(self, sig: Any, data: Any) -> None:
-        try:
-            super().save_overload(sig, data)
-        except OSError:
-            # A folder that was prepared for others, or a full disk: it is compiled again next time.
-            return
-        tell_compiled(self._py_func.__name__)
-
-
-class _WholeCache(_PartCache):
-    """The same as a whole; the first one that is missing has all of them compiled."""
-
-    _impl_class = _Whole
+    _impl_class = _Kept
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        found = super().load_overload(sig, target_context)
+        # Past what numba gets ready to compile, which takes as long as to load a kernel.
+        found = self._load_overload(sig, target_context)
         if found is None and COMPILES_HERE not in os.environ and prepare():
-            found = super().load_overload(sig, target_context)
+            found = self._load_overload(sig, target_context)
         return found
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        # A folder that was prepared for others, or a full disk: it is compiled again next time.
+        with suppress(OSError):
+            super().save_overload(sig, data)
 
 
 class _PartOfOthers(CPUDispatcher):
@@ -95,6 +78,14 @@ class _PartOfOthers(CPUDispatcher):
         named = {name: types.unliteral(value) for name, value in kws.items()}
         return super().get_call_template(tuple(map(types.unliteral, args)), named)
 
+    def compile(self, sig: Any) -> Any:
+        """Compile for given types, and say so."""
+        known = len(self.overloads)
+        handle = super().compile(sig)
+        if len(self.overloads) > known:
+            tell_compiled(self.py_func.__name__)
+        return handle
+
 
 class Kernel(CPUDispatcher):
     """A kernel as Python calls it."""
@@ -104,14 +95,14 @@ class Kernel(CPUDispatcher):
         # A wrapper for calls through pointers, which nobody makes, takes as long as the kernel.
         options = {"nopython": True, "boundscheck": None, "no_cfunc_wrapper": True, **options}
         super().__init__(function, targetoptions=options, pipeline_class=WholeCompiler)
-        self._part = _PartOfOthers(
-            function,
-            targetoptions={**options, "no_cpython_wrapper": True},
-            pipeline_class=PartCompiler,
-        )
         if kernel_folder() is not None:
-            self._cache = _WholeCache(function)
-            self._part._cache = _PartCache(function)
+            self._cache = _Cache(function)
+
+    @cached_property
+    def _part(self) -> _PartOfOthers:
+        """The same for other kernels, of which most are never called while they are kept."""
+        options = {**self.targetoptions, "no_cpython_wrapper": True}
+        return _PartOfOthers(self.py_func, targetoptions=options, pipeline_class=PartCompiler)
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
         """The types of a call by another kernel."""

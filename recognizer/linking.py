@@ -1,20 +1,21 @@
 """Kernels that kernels call, as parts to be linked.
 
 numba optimises a callee and makes machine code of it, and does both again in each of its callers,
-level by level. A part is typed and lowered once, and left at that: only what Python calls is
-optimised, with all that is linked into it, and made machine code of. That halves the time it takes
-to compile palpate.
+level by level. A part is typed and lowered once a process, and left at that: only what Python calls
+is optimised, with all that is linked into it, and made machine code of. That halves the time it
+takes to compile palpate. Parts aren't kept on disk: what is linked would depend on which process
+came first, and the last digits of results on what is linked.
 """
 
 from __future__ import annotations
 
 from typing import Any
 
-import llvmlite.binding as llvm
 from numba import _dynfunc
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler, CompileResult, compile_result
 from numba.core.environment import lookup_environment
+from numba.core.runtime import rtsys
 
 
 class PartLibrary(JITCodeLibrary):
@@ -28,11 +29,6 @@ class PartLibrary(JITCodeLibrary):
         self._codegen._scan_and_fix_unresolved_refs(self._final_module)
         self._finalized = True
 
-    def serialize_using_object_code(self) -> tuple[str, str, bytes]:
-        """What is kept of it: there is no object code."""
-        self._ensure_finalized()
-        return self.name, "bitcode", self._final_module.as_bitcode()
-
 
 class PartCompiler(Compiler):
     """Compiles parts."""
@@ -41,11 +37,24 @@ class PartCompiler(Compiler):
         """Lower a function, and stop there."""
         self.state.library = PartLibrary(self.state.targetctx.codegen(), func.__qualname__)
         self.state.flags.no_compile = True
-        return _callable(super().compile_extra(func))
+        part = super().compile_extra(func)
+        if self.state.flags.fastmath:
+            # Which products and sums are contracted must not depend on what calls them.
+            code = part.library._final_module.get_function(part.fndesc.llvm_func_name)
+            code.add_function_attribute("noinline")
+        return _callable(part)
 
 
 class WholeLibrary(JITCodeLibrary):
     """Code that Python calls, with its parts."""
+
+    def serialize_using_object_code(self) -> tuple[str, str, Any]:
+        """What is kept of it: machine code and the names in it, but nothing to link, which takes as
+        long to read as all else."""
+        self._ensure_finalized()
+        everything = (*self._final_module.functions, *self._final_module.global_variables)
+        names = tuple(symbol.name for symbol in everything if not symbol.is_declaration)
+        return self.name, "object", (self._get_compiled_object(), names)
 
     def _finalize_specific(self) -> None:
         super()._finalize_specific()
@@ -67,29 +76,28 @@ class WholeCompiler(Compiler):
         return super().compile_extra(func)
 
 
-def rebuilt_part(target_context: Any, kept: Any) -> CompileResult:
-    """A part as it was kept."""
-    (name, _, bitcode), described, environment, signature, *rest, referenced = kept
-    library = PartLibrary(target_context.codegen(), name)
-    library._final_module = llvm.parse_bitcode(bitcode)
+def rebuilt(target_context: Any, kept: Any) -> CompileResult:
+    """What Python calls, as it was kept."""
+    (name, _, (machine_code, names)), described, environment, *rest = kept
+    rtsys.initialize(target_context)  # what allocates arrays
+    library = WholeLibrary(target_context.codegen(), name)
+    library.enable_object_caching()
+    library._set_compiled_object(machine_code)
     library._finalize_final_module()
-    objectmode, lifted, annotation, reload_init = rest
-    return _callable(
-        compile_result(
-            target_context=target_context,
-            typing_context=target_context.typing_context,
-            library=library,
-            environment=environment,
-            entry_point=None,
-            fndesc=described,
-            type_annotation=annotation,
-            signature=signature,
-            objectmode=objectmode,
-            lifted=lifted,
-            reload_init=reload_init,
-            referenced_envs=referenced,
-        )
+    library._codegen._engine._defined_symbols |= set(names)
+    fields = ("signature", "objectmode", "lifted", "type_annotation", "reload_init")
+    result = compile_result(
+        target_context=target_context,
+        typing_context=target_context.typing_context,
+        library=library,
+        entry_point=target_context.get_executable(library, described, environment),
+        fndesc=described,
+        environment=environment,
+        **dict(zip((*fields, "referenced_envs"), rest, strict=True)),
     )
+    for one in result.referenced_envs:
+        library.codegen.set_env(one.env_name, one)
+    return result
 
 
 def _callable(part: CompileResult) -> CompileResult:

@@ -34,7 +34,7 @@ COMPILES_HERE = "PALPATE_COMPILES_HERE"
 """Set in the environment of these processes, which are not to start others."""
 TOLD = "PALPATE_TOLD"
 """Set in the environment by a command that has said it already."""
-KERNELS = 290
+KERNELS = 360
 """About as many are there, for the progress that is shown."""
 STEPS = 4
 """Lines of progress where they can't be written over each other."""

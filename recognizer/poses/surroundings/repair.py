@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linprog
 
 from .repair_kernels import apply_motion, bound_rows
 
@@ -108,6 +107,8 @@ def repair(
 def _lower(values: Floats, rows: Floats, size: float) -> tuple[Floats | None, float]:
     """The motion within a box that lowers the largest value most, and what it promises."""
     near = values + size * np.abs(rows).sum(axis=1) > values.max() - RELEVANT
+    from scipy.optimize import linprog  # a tenth of all imports, and seldom needed
+
     found = linprog(
         np.append(np.zeros(6), 1.0),
         A_ub=np.column_stack([rows[near], np.full(int(near.sum()), -1.0)]),
