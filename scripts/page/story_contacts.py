@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,12 +17,13 @@ __all__ = ["Beliefs", "contacts_story"]
 
 MOST_STEPS = 40
 """More touches are told several at a time."""
-MOST_WITH_WAYS = 300
-"""Once a belief of few touches has more interpretations, each of which is held against every way
-that was free, those of fewer touches are worked out without these ways."""
-LIMITS = SearchLimits(budget=5_000, nodes=1_000_000)
-"""Of the beliefs of few touches; once one is cut short by them, it and those of fewer are left
-out. A step is counted and not timed, so that a page shows the same on every machine."""
+MOST_WITH_WAYS = 200
+"""Interpretations of a belief of few touches beyond which the ways that were free don't count for
+it, nor for those of fewer touches: each is held against every way, for up to 20 ms."""
+MOST_INTERPRETATIONS, MOST_NODES, MOST_NODES_WITHOUT_NORMALS = 20_000, 400_000, 20_000
+"""Of a belief of few touches, shared out evenly among the models of the library. One that needs
+more is left out, and so are those of fewer touches; a node takes ten times as long where normals
+are missing. Steps are counted and not timed, so that a page shows the same on every machine."""
 WAY = 0.6
 """How much of a way is drawn, in diameters of the largest part."""
 
@@ -53,7 +55,7 @@ class Beliefs:
     ) -> Beliefs:
         """Work out what fewer contacts would have said, from the last one back.
 
-        Few contacts allow much, which takes longer to find.
+        Few contacts allow much, which takes longer to find: what would take too long is left out.
 
         Args:
             felt: what was felt.
@@ -68,25 +70,29 @@ class Beliefs:
         known = {}
         if earlier and earlier.final and earlier.final.support == final.support:
             known = _shared(earlier, contacts)
-        methods = [ways, FreeSpace.none()] if len(ways) else [FreeSpace.none()]
-        limited = recognizer.limited(LIMITS)
+        limited, last = recognizer.limited(_limits(contacts, len(recognizer.models))), final
         for size in reversed(_halts(len(contacts))):
             if size in found or size <= final.outliers:
                 continue
             if size in known:
                 found[size] = known[size]
-            elif methods:
-                belief = limited.recognize(
-                    contacts[:size],
-                    outliers=final.outliers,
-                    free_space=_part(methods[0], slice(0, size)),
-                    support=final.support,
-                )
-                if not belief.complete:
-                    break
-                found[size] = belief
-                if len(methods) > 1 and belief.interpretations > MOST_WITH_WAYS:
-                    methods.pop(0)
+                continue
+            if _nodes(last) > _most_nodes(contacts):
+                break
+            of_these = partial(
+                limited.recognize,
+                contacts[:size],
+                outliers=final.outliers,
+                support=final.support,
+            )
+            last = belief = of_these()
+            if belief.complete and len(ways) and belief.interpretations <= MOST_WITH_WAYS:
+                belief = of_these(free_space=_part(ways, slice(0, size)))
+            else:
+                ways = FreeSpace.none()
+            if not belief.complete:
+                break
+            found[size] = belief
         return cls(felt, final, found)
 
 
@@ -175,6 +181,21 @@ def _moment(beliefs: Beliefs, first: int, stop: int, length: float) -> Moment:
 def _halts(touches: int) -> list[int]:
     """After how many touches the story halts."""
     return sorted({-(-touches * step // MOST_STEPS) for step in range(1, MOST_STEPS + 1)} - {0})
+
+
+def _limits(contacts: Contacts, models: int) -> SearchLimits:
+    """Of beliefs of few of these touches, in a library of so many models."""
+    budget, nodes = MOST_INTERPRETATIONS // models, _most_nodes(contacts) // models
+    return SearchLimits(budget=max(budget, 1), nodes=max(nodes, 1))
+
+
+def _most_nodes(contacts: Contacts) -> int:
+    known = bool((contacts.normal_error < np.pi).all())
+    return MOST_NODES if known else MOST_NODES_WITHOUT_NORMALS
+
+
+def _nodes(belief: Belief) -> int:
+    return sum(int(search.nodes.sum()) for search in belief.searches)
 
 
 def _shared(earlier: Beliefs, contacts: Contacts) -> dict[int, Belief]:

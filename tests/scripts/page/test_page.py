@@ -27,6 +27,7 @@ from palpate.recognizer import Constraints, Contacts, FeltFile, FreeSpace, Recog
 from palpate.recognizer.tree.tree import prune, spread_order
 from palpate.scripts.benchmark.playing import task_of
 from palpate.scripts.cli import app
+from palpate.scripts.page import story_contacts
 from palpate.scripts.page.page import CORE, MODULES, check_page_path, page, story_json, write_page
 from palpate.scripts.page.story import Story
 from palpate.scripts.page.story_contacts import Beliefs, contacts_story
@@ -207,6 +208,47 @@ def test_ways_are_drawn_where_they_pass_and_what_met_nothing_comes_last():
     assert np.abs(way.starts - middle)[0, 0] < 0.3
     np.testing.assert_allclose([way.starts[0, 2], way.ends[0, 2]], middle[2] + 0.5)
     np.testing.assert_allclose(told.moments[1].ways.ends, contacts.positions[:1])
+
+
+def walked() -> tuple[FeltFile, Recognizer]:
+    """Five touches with the ways to them."""
+    contacts = touched("housing", 5)
+    ways = FreeSpace(contacts.positions + 0.1 * contacts.normals, contacts.positions, error=1e-4)
+    return FeltFile(contacts, ways, (2, 3, 4, 5, 6), 0), Recognizer([model("housing")])
+
+
+def test_ways_count_for_as_many_interpretations_as_are_soon_held_against_them(monkeypatch):
+    felt, recognizer = walked()
+    final = recognizer.recognize(felt.contacts, free_space=felt.free_space)
+    plain = [recognizer.recognize(felt.contacts[: n + 1]).interpretations for n in range(4)]
+    most = plain[3]
+    assert plain[2] > most
+    monkeypatch.setattr(story_contacts, "MOST_WITH_WAYS", most)
+    told = Beliefs.of(felt, final, recognizer)
+    counted = {size: len(belief.free_space) for size, belief in told.by_count.items()}
+    assert counted == {1: 0, 2: 0, 3: 0, 4: 4, 5: 5}
+    story = contacts_story("t", recognizer, told, ("mm", 1e-3))
+    late = [moment.told.endswith("the way there doesn't count yet") for moment in story.moments[1:]]
+    assert late == [True, True, True, False, False]
+
+
+@pytest.mark.parametrize("name", ["MOST_INTERPRETATIONS", "MOST_NODES"])
+def test_beliefs_that_would_take_long_are_left_out_by_count(name, monkeypatch):
+    felt, recognizer = walked()
+    final = recognizer.recognize(felt.contacts)
+    most = {
+        "MOST_INTERPRETATIONS": recognizer.recognize(felt.contacts[:3]).interpretations + 1,
+        "MOST_NODES": story_contacts._nodes(final),
+    }
+    monkeypatch.setattr(story_contacts, name, most[name])
+    told = Beliefs.of(felt, final, recognizer)
+    assert set(told.by_count) < {1, 2, 3, 4, 5}
+    assert set(told.by_count) == set(range(min(told.by_count), 6)), "the last ones are told"
+    story = contacts_story("t", recognizer, told, ("mm", 1e-3))
+    assert story.moments[1].told == "line 2 of the file; not worked out, so much fits"
+    monkeypatch.setattr(story_contacts, name, 0)
+    before = Beliefs.of(felt, final, recognizer, earlier=told)
+    assert before.by_count == told.by_count, "what was worked out before stays"
 
 
 def test_models_of_many_triangles_do_not_make_a_page_too_large():
