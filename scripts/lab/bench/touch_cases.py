@@ -102,7 +102,7 @@ class ApproachSampler:
             sides = corners[:, 1:] - corners[:, :1]
             areas = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
             triangle = corners[rng.choice(len(corners), p=areas / areas.sum())]
-            return rng.dirichlet(np.ones(3)) @ triangle, self.model.normals[feature]
+            return rng.dirichlet(np.ones(3)) @ triangle, self.model.normals[feature].copy()
         points, cone = (self._edges if kind == EDGE else self._vertices)[feature]
         normal = rng.dirichlet(np.ones(len(cone))) @ cone
         return rng.dirichlet(np.ones(len(points))) @ points, normal / np.linalg.norm(normal)

@@ -51,7 +51,7 @@ VARIANTS = {
     "gaussian": Setting(ENV_ID, {"distribution": "gaussian"}),
     "range": Setting(ENV_ID, {"sensor": "range"}),
     "range-grid": Setting(ENV_ID, {"sensor": "range-grid", "placement": "resting"}),
-    "rest-dropped": Setting(REST_ENV_ID, {"dropped": True}),
+    "rest-dropped": Setting(REST_ENV_ID, {"placement": "dropped"}),
     "finger-resting": Setting(FINGER_ENV_ID, {"placement": "resting"}),
     "finger-dropped": Setting(FINGER_ENV_ID, {"placement": "dropped"}),
     "finger-free-space": Setting(FINGER_ENV_ID, {"use_free_space": True}),

@@ -130,7 +130,7 @@ def test_every_pose_within_the_bounds_satisfies_the_linear_ones(name):
         T = Rotation.from_rotvec(turn * axis / np.linalg.norm(axis))
         shift = rng.uniform(-0.002, 0.002, 3)
         centre = model.centroid
-        moved = RigidTransform.from_components(centre + shift - T.apply(centre), T)
+        moved = RigidTransform.from_components(centre + shift - T.apply(centre.copy()), T)
         start = touches.T_world_object * moved.inv()
         x = start.inv().apply(contacts.positions.copy())
         u = start.rotation.inv().apply(contacts.normals.copy())
