@@ -17,7 +17,7 @@ from ..sweep_oracle import EDGE, FACE, VERTEX, SweepOracle, Swept
 
 Floats = NDArray[np.float64]
 
-KINDS = {FACE: "face", EDGE: "edge", VERTEX: "vertex"}
+KINDS: dict[int, str] = {FACE: "face", EDGE: "edge", VERTEX: "vertex"}
 STEEPEST = 0.1
 """Least cosine between the way back and the normal: the flattest approach is 84 degrees off it."""
 MOST_DRAWS = 2000
@@ -64,7 +64,8 @@ class ApproachSampler:
 
     def count(self, kind: int) -> int:
         """How many features of a kind there are."""
-        counts = {FACE: self.model.face_count, EDGE: len(self._edges), VERTEX: len(self._vertices)}
+        edges, vertices = len(self._edges), len(self._vertices)
+        counts: dict[int, int] = {FACE: self.model.face_count, EDGE: edges, VERTEX: vertices}
         return counts[kind]
 
     def draw(self, kind: int, feature: int, rng: np.random.Generator) -> Approach | None:
