@@ -23,7 +23,7 @@ What none of the cases covers is a face of which less than a quarter shows aroun
 patch that is neither convex nor hollow: a sliver between steps, a saddle, a groove, a fin. A patch
 is kept only if it and its eight neighbours are flat within little more than the error, so such a
 detail would have to be as shallow as the error over 7 x 7 readings. `RangeScanner` refuses objects
-with edges so short; `tests/envs/sensors/test_range_sensor.py` looks for others that slip through.
+with edges so short; `tests/envs/sensors/test_patches.py` looks for others that slip through.
 """
 
 from __future__ import annotations
