@@ -6,6 +6,10 @@ what they are, a number or a truth value: numba compiles a callee anew for each 
 is compiled is kept under a stamp that covers all kernels, see `kernel_store`.
 """
 
+# numba's inner parts say little of their types.
+# pyright: reportIncompatibleMethodOverride=false, reportAttributeAccessIssue=false
+# pyright: reportPrivateImportUsage=false
+
 from __future__ import annotations
 
 import os

@@ -7,6 +7,10 @@ takes to compile palpate. Parts aren't kept on disk: what is linked would depend
 came first, and the last digits of results on what is linked.
 """
 
+# numba's inner parts say little of their types.
+# pyright: reportIncompatibleMethodOverride=false, reportAttributeAccessIssue=false
+# pyright: reportPrivateImportUsage=false
+
 from __future__ import annotations
 
 from typing import Any

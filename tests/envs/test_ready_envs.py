@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import re
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -17,7 +18,7 @@ from palpate.recognizer import EDGE, FACE, VERTEX
 
 gymnasium.register_envs(palpate.envs)
 
-READY = {
+READY: dict[str, dict[str, Any]] = {
     "palpate/ProbeRest-v0": {"placement": "resting"},
     "palpate/ProbeFinger-v0": {"sensor": "finger"},
 }
