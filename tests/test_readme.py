@@ -62,7 +62,7 @@ def coarse(picture: Path) -> np.ndarray:
 
 @each_document
 def test_every_command_that_is_named_exists(document):
-    group = typer.main.get_command(app)
+    group = typer.main.get_group(app)
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
     for tool, *words in commands(document):
         if tool == "palpate":
