@@ -59,7 +59,7 @@ def test_the_finger_stops_where_geometry_says(name):
     sensor, scene = make_finger(name)
     sampler, rng = ApproachSampler(scene.model, RADIUS, sensor.reach), np.random.default_rng(0)
     features = all_features(scene.model)
-    first = {
+    first: dict[int, int] = {
         FACE: 0,
         EDGE: features.face_count,
         VERTEX: features.face_count + features.edge_count,
