@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from ...recognizer import Belief, Contacts, Polygon, PoseTolerance, Recognizer, SearchLimits
-from ..observation import Observation
+from ..observation import Observation, check_sizes
 from ..pictures.window import Window
 from ..scene.scene import OBJECT
 from ..sensors.noise import SensorNoise
+from ..sensors.touch import finite_action
 from .library import OutlineSource, load_outlines
 from .observation import PlanarObservationLayout
 from .picture import PlanarGhost, PlanarPicture, draw_planar
@@ -140,9 +141,7 @@ class PlanarProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
                 positive or is too tight, or fewer than one probe or hypothesis.
             gymnasium.error.DependencyNotInstalled: render mode "human" where no window can open.
         """
-        for name, value in (("max_probes", max_probes), ("hypotheses_shown", hypotheses_shown)):
-            if value < 1:
-                raise ValueError(f"{name} is {value}; it must be at least 1")
+        check_sizes(max_probes=max_probes, hypotheses_shown=hypotheses_shown)
         known_modes = (None, *self.metadata["render_modes"])
         if render_mode not in known_modes:
             raise ValueError(f"render_mode is {render_mode!r}; it must be one of {known_modes}")
@@ -213,10 +212,7 @@ class PlanarProbeEnv(gymnasium.Env[dict[str, Any], NDArray[np.floating]]):
             gymnasium.error.ResetNeeded: before the first reset.
         """
         outline, pose = self._placed()
-        wanted = np.asarray(action, np.float64)
-        if wanted.shape != (2,) or not np.isfinite(wanted).all():
-            raise ValueError(f"an action is two finite numbers, not {action!r}")
-        bearing, offset = np.clip(wanted, -1.0, 1.0) * (np.pi, self.half_width)
+        bearing, offset = finite_action(action, 2) * (np.pi, self.half_width)
         touch = self._probe.touch(outline, pose, float(bearing), float(offset), self.np_random)
         self._touches.append(touch)
         if touch.outcome == OBJECT:

@@ -46,7 +46,7 @@ def finite_action(action: NDArray[np.floating], numbers: int) -> Floats:
     """
     wanted = np.asarray(action, np.float64)
     if wanted.shape != (numbers,) or not np.isfinite(wanted).all():
-        named = "three" if numbers == 3 else "four"
+        named = {2: "two", 3: "three", 4: "four"}[numbers]
         raise ValueError(f"an action is {named} finite numbers, not {action!r}")
     return np.clip(wanted, -1.0, 1.0)
 

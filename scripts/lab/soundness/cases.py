@@ -6,7 +6,7 @@ uniform, and noise is uniform in its bounds or, in a third of the cases, on the 
 Some searches would take minutes: of few contacts without normals, or on edges and vertices too,
 there are millions of interpretations. So that a case takes well under a second typically, `KINDS`
 says how few contacts each kind draws; with edges and vertices, and without any normal, all but the
-last two contacts' interpretation is told, and the search goes on from there as `Belief.update`
+last two contacts' interpretation is told, and the search goes on from there as `Recognizer.update`
 does, but for a few cases from scratch. Limits on interpretations and branches cut short what would
 run away; such cases are counted apart.
 """
