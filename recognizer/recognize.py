@@ -224,7 +224,7 @@ class Recognizer:
         for entry, diameter in zip(self.library.solids, self._spans, strict=False):
             # Memo, Section 7: no two contacts are farther apart than the object is wide.
             if span > diameter * (1.0 + 1e-9):
-                searches.append(Search.none(entry.model.name, len(contacts)))
+                searches.append(Search.none(entry.model.name))
                 continue
             found = search_solid(
                 entry,
@@ -233,7 +233,7 @@ class Recognizer:
                 self.tolerance,
                 self.limits,
                 outliers=outliers,
-                prefixes=_interpretations(before, entry.model.name),
+                known=_interpretations(before, entry.model.name),
                 surroundings=known,
             )
             _note(found, hypotheses, logs, searches)

@@ -47,7 +47,9 @@ def hold_against_surroundings() -> None:
     surroundings = Surroundings.of(paths, SupportPlane(height=-1.5, error=0.01, resting=True))
     faces = hits.faces.astype(np.int32)[None]
     one, nothing = np.eye(3)[None], np.zeros((1, 3))
-    poses = Poses(faces, one, nothing, np.zeros(1), np.eye(6)[None], np.ones(1, bool))
+    poses = Poses(
+        faces, one, nothing, np.zeros(1), np.eye(6)[None], np.ones(1, bool), np.zeros((1, 2))
+    )
     clear(box, features, poses, contacts, surroundings, stable_faces(box)[0])
     bounds = bounds_of(box, features, contacts, surroundings)
     # A little off, so that there is something to repair.

@@ -35,9 +35,9 @@ def pin_down(
 ) -> Hypothesis:
     """Move a pose to the middle of those that its contacts allow; open it if they reach too far.
 
-    All poses are meant that are connected, within the bounds, to the hypothesis's own. The
-    motions are linear to first order, and the bounds wider by what that may be off within the
-    pose tolerance (see `extent_kernels.contact_rows`): so no such pose is overlooked.
+    The motions are linear to first order, and the bounds wider by what that may be off as far as
+    the hypothesis says that its poses reach (see `extent_kernels.contact_rows`): so none of them is
+    overlooked, whatever way they are connected.
 
     Args:
         test: of the object.
@@ -57,7 +57,13 @@ def pin_down(
     axes = _axes(hypothesis.covariance)
     kernel = kernel_contacts(contacts)
     box = np.zeros((6, 2))
+    turn, shift = hypothesis.farthest_turn, hypothesis.farthest_shift
     for _ in range(ROUNDS):
+        if turn * test.radius > extent_kernels.WIDEST * allowed.max() or (
+            shift > extent_kernels.WIDEST * allowed.max()
+        ):
+            return replace(hypothesis, freedoms=axes[2:3])
+        turn = max(turn, tolerance.rotation)
         box, alike = extent_kernels.look_around(
             np.ascontiguousarray(hypothesis.interpretations),
             kernel,
@@ -65,13 +71,17 @@ def pin_down(
             test.model,
             test.features.half_angles,
             hypothesis.T_world_object,
-            tolerance.rotation,
+            turn,
             axes,
             allowed,
-            *_support_rows(test, hypothesis, tolerance.rotation, support, stable),
+            *_support_rows(test, hypothesis, turn, support, stable),
         )
         if alike:
-            return hypothesis
+            return replace(
+                hypothesis,
+                farthest_turn=min(hypothesis.farthest_turn, tolerance.rotation),
+                farthest_shift=min(hypothesis.farthest_shift, most_shift),
+            )
         if not (movable and np.isfinite(box).all()):
             break
         middle = box.mean(axis=1)
@@ -84,7 +94,12 @@ def pin_down(
         )
         if not share:
             break
-        hypothesis = replace(hypothesis, T_world_object=moved)
+        step = share * middle @ axes
+        turn += float(np.linalg.norm(step[:3])) / test.radius
+        shift += float(np.linalg.norm(step[3:]))
+        hypothesis = replace(
+            hypothesis, T_world_object=moved, farthest_turn=turn, farthest_shift=shift
+        )
         box -= share * middle[:, None]
         # Wider than twice what is allowed: from wherever, something is beyond it.
         if (np.ptp(box, axis=1) > 2.0 * np.repeat(allowed, 3)).any():

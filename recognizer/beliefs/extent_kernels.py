@@ -44,7 +44,7 @@ def contact_rows(faces, contacts, errors, model, half_angles, x, u, turn, rows, 
 
     Args:
         faces: (n,) the feature of each contact, -1 for none.
-        contacts: see `search_kernels.search_model`.
+        contacts: see `pose.kernel_contacts`.
         errors: likewise.
         model: likewise.
         half_angles: likewise.
@@ -146,7 +146,7 @@ def look_around(
 
     Args:
         interpretations: (m, n) features.
-        contacts: see `search_kernels.search_model`, as are errors, model and half_angles.
+        contacts: see `pose.kernel_contacts`, as are errors, model and half_angles.
         errors: likewise.
         model: likewise.
         half_angles: likewise.
@@ -213,7 +213,7 @@ def move_within(interpretation, contacts, model, pose, step):
 
     Args:
         interpretation: (n,) features.
-        contacts: see `search_kernels.search_model`, as is the model.
+        contacts: see `pose.kernel_contacts`, as is the model.
         model: likewise.
         pose: (4, 4) object to world.
         step: (6,) rotation about the object's centroid, times its radius, and shift.

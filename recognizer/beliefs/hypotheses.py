@@ -65,6 +65,11 @@ class Hypothesis:
     squares of its best interpretation, with half a turn and half a diameter known beforehand."""
     proven: bool = True
     """Whether ``pose`` meets every bound; if not, no such pose was found and none excluded."""
+    farthest_turn: float = np.inf
+    """No pose that it stands for is turned from ``pose`` by more, radians, but for the object's own
+    symmetries; infinite in the plane, where that isn't known."""
+    farthest_shift: float = np.inf
+    """Of none is the object's centroid farther away, metres; likewise."""
 
     def __getstate__(self) -> dict[str, Any]:
         # SciPy normalises a pickled pose anew, which changes its last bits; it is made again.
@@ -118,8 +123,11 @@ def cluster(
         return [], np.zeros(0)
     radius = model.diameter / 2.0
     most_shift = tolerance.distance(model.diameter, position_error)
-    members, starts, matrices, covariances, log_weights, motions, loose = weigh_poses(
-        (poses.rotations, poses.translations, poses.costs, poses.informations, poses.proven),
+    members, starts, matrices, covariances, log_weights, motions, loose, far = weigh_poses(
+        (
+            *(poses.rotations, poses.translations, poses.costs, poses.informations),
+            *(poses.proven, poses.reaches),
+        ),
         model.centroid,
         model.symmetries,
         radius,
@@ -137,13 +145,23 @@ def cluster(
                 object_name=model.name,
                 T_world_object=matrices[group],
                 weight=1.0,
-                interpretations=poses.faces[rows],
+                interpretations=_distinct(poses.faces[rows]),
                 freedoms=_open_motions(rows, loose, motions, poses.rotations),
                 covariance=covariances[group],
                 proven=bool(poses.proven[rows[0]]),
+                farthest_turn=float(far[group, 0]),
+                farthest_shift=float(far[group, 1]),
             )
         )
     return hypotheses, log_weights
+
+
+def _distinct(rows: NDArray[np.int32]) -> NDArray[np.int32]:
+    """Rows without those that were there before: an interpretation may have several components."""
+    if len(rows) < 2:
+        return rows
+    _, first = np.unique(rows, axis=0, return_index=True)
+    return rows[np.sort(first)]
 
 
 def _open_motions(

@@ -62,8 +62,9 @@ def weigh_poses(poses, centre, symmetries, radius, most_turn, most_shift, allowe
     """Group poses, and weigh each group by the volumes of its poses; see `hypotheses.cluster`.
 
     Args:
-        poses: (m, 3, 3) rotations and (m, 3) translations, object to world; (m,) misfits; (m, 6, 6)
-            informations; (m,) whether the pose is a witness.
+        poses: (m, 3, 3) rotations and (m, 3) translations, object to world; (m,) misfits;
+            (m, 6, 6) informations; (m,) whether the pose is a witness; (m, 2) reaches, see
+            `pose.Poses`.
         centre: (3,) the object's centroid, object frame, metres.
         symmetries: (g, 3, 3) the object's rotations onto itself.
         radius: half the object's diameter, metres.
@@ -75,16 +76,18 @@ def weigh_poses(poses, centre, symmetries, radius, most_turn, most_shift, allowe
         (m,) rows of the poses, group by group, the best of each first; (k + 1,) where each group
         starts among them; of each group the pose of its best member, (k, 4, 4), and its covariance,
         (k, 6, 6); (k,) the logarithm of its weight, not yet normalised; of each row of the poses
-        its principal motions, (m, 6, 6), columns, and which of them are open, (m, 6).
+        its principal motions, (m, 6, 6), columns, and which of them are open, (m, 6); (k, 2) how
+        far the poses that a group stands for can be from that of its best member: the turn,
+        radians, and the way of the object's centroid, metres.
     """
-    rotations, translations, costs, informations, proven = poses
+    rotations, translations, costs, informations, proven, reaches = poses
     count = len(costs)
     members, starts = _in_groups(
         rotations, translations, costs, proven, centre, symmetries, most_turn, most_shift
     )
     found = len(starts) - 1
     matrices, covariances = np.zeros((found, 4, 4)), np.zeros((found, 6, 6))
-    log_weights = np.empty(found)
+    log_weights, far = np.empty(found), np.zeros((found, 2))
     motions, loose = np.empty((count, 6, 6)), np.empty((count, 6), np.bool_)
     shares = np.empty(count)
     prior = np.zeros((6, 6))
@@ -99,6 +102,10 @@ def weigh_poses(poses, centre, symmetries, radius, most_turn, most_shift, allowe
             for k in range(6):
                 shares[at] -= 0.5 * np.log(precisions[k])
                 loose[row, k] = 3.0 / np.sqrt(precisions[k]) > allowed
+            best = members[starts[g]]
+            turn, way = _apart(rotations, translations, best, row, centre, symmetries)
+            far[g, 0] = max(far[g, 0], turn + reaches[row, 0])
+            far[g, 1] = max(far[g, 1], way + reaches[row, 1])
             if at == starts[g]:
                 matrices[g, :3, :3], matrices[g, :3, 3] = rotations[row], translations[row]
                 matrices[g, 3, 3] = 1.0
@@ -106,7 +113,28 @@ def weigh_poses(poses, centre, symmetries, radius, most_turn, most_shift, allowe
         of_group = shares[starts[g] : starts[g + 1]]
         most = of_group.max()
         log_weights[g] = most + np.log(np.exp(of_group - most).sum())
-    return members, starts, matrices, covariances, log_weights, motions, loose
+    return members, starts, matrices, covariances, log_weights, motions, loose, far
+
+
+@kernel
+def _apart(rotations, translations, first, second, centre, symmetries):
+    """The turn between two poses, up to a symmetry of the object, and the way of its centroid."""
+    if first == second:
+        return 0.0, 0.0
+    square, most = 0.0, -1.0
+    for i in range(3):
+        way = translations[second, i] - translations[first, i]
+        for j in range(3):
+            way += (rotations[second, i, j] - rotations[first, i, j]) * centre[j]
+        square += way * way
+    between = rotations[first].T @ rotations[second]
+    for s in range(len(symmetries)):
+        trace = 0.0
+        for i in range(3):
+            for j in range(3):
+                trace += between[i, j] * symmetries[s, i, j]
+        most = max(most, 0.5 * (trace - 1.0))
+    return np.arccos(min(most, 1.0)), np.sqrt(square)
 
 
 @kernel

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ..models.polygon import Polygon
 from ..models.polyhedron import Polyhedron
-from ..poses.search.solid import SolidEntry
+from ..poses.solid import SolidEntry
 from .outline import PlanarEntry
 
 

@@ -68,12 +68,11 @@ def search_polygon(
     hypotheses, log_weights = cluster_planar(entry.model, poses, tolerance, largest)
     search = Search(
         object_name=entry.model.name,
-        nodes=tree.nodes,
-        pruned=len(faces),
+        nodes=int(tree.nodes.sum()),
+        tried=len(faces),
         tested=poses.interpretations,
         hypotheses=len(hypotheses),
         complete=complete,
-        boxes=0,
         search_seconds=tree_seconds + pose_seconds,
         cluster_seconds=perf_counter() - started,
     )
@@ -147,12 +146,12 @@ def _grow(
         faces = grown
         complete &= whole
         tree_seconds += perf_counter() - started
-        if len(faces) > limits.crowd and faces.shape[1] < count:
+        if len(faces) > limits.few and faces.shape[1] < count:
             # Rejecting part of an interpretation rejects every way to complete it.
             started = perf_counter()
             faces = test.prune(faces, tree.contacts[: faces.shape[1]])
             pose_seconds += perf_counter() - started
-        step = limits.stage if len(faces) <= limits.crowd else 1
+        step = limits.stage if len(faces) <= limits.few else 1
     if not len(faces):
         faces = np.zeros((0, count), np.int32)
     return faces, complete, tree_seconds, pose_seconds

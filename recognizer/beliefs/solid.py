@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
 from ..contacts.contacts import Contacts
-from ..poses.search.solid import SolidEntry
-from ..poses.search.solid_search import find_poses
+from ..poses.solid import SolidEntry
+from ..poses.solid_search import Aim, find_poses
 from ..poses.surroundings.surroundings import Surroundings
 from ..tree.limits import SearchLimits
 from ..tree.tree import Constraints
@@ -26,7 +26,7 @@ def search_solid(
     limits: SearchLimits,
     *,
     outliers: int = 0,
-    prefixes: NDArray[np.int32] | None = None,
+    known: NDArray[np.int32] | None = None,
     surroundings: Surroundings | None = None,
 ) -> tuple[list[Hypothesis], NDArray[np.float64], Search]:
     """The search and its groups of poses, for one solid.
@@ -38,33 +38,31 @@ def search_solid(
         tolerance: which poses count as the same.
         limits: how far the search goes.
         outliers: how many contacts may lie on no feature.
-        prefixes: (m, k) all interpretations of the first k contacts, if known.
+        known: (m, k) all interpretations of the first k contacts, if they are known.
         surroundings: what else is known.
 
     Returns:
         Hypotheses; (h,) the logarithms of their weights, not yet normalised; and what was done.
     """
     started = perf_counter()
-    found = find_poses(
-        entry,
-        contacts,
+    largest = float(contacts.position_error.max())
+    aim = Aim(
         constraints,
         limits,
-        outliers=outliers,
-        prefixes=prefixes,
-        surroundings=surroundings or Surroundings.of(None, None),
+        tolerance.rotation,
+        tolerance.distance(entry.model.diameter, largest),
+        outliers,
     )
+    found = find_poses(entry, contacts, aim, surroundings or Surroundings.of(None, None), known)
     searched = perf_counter()
-    largest = float(contacts.position_error.max())
     hypotheses, log_weights = cluster(entry.model, found.poses, tolerance, largest)
     search = Search(
         object_name=entry.model.name,
         nodes=found.nodes,
-        pruned=found.pruned,
+        tried=found.tried,
         tested=len(found.poses),
         hypotheses=len(hypotheses),
         complete=found.complete,
-        boxes=found.boxes,
         search_seconds=searched - started,
         cluster_seconds=perf_counter() - searched,
     )

@@ -41,7 +41,7 @@ def signed_distance(x, model, faces, nearest, near):
 
     Args:
         x: (3,) the point, object frame.
-        model: see `search_kernels.search_model`.
+        model: see `pose.ModelTest`.
         faces: how many of its features are faces; they come first.
         nearest: (3,) the nearest point of the surface, written in place.
         near: (3,) work space.
@@ -76,7 +76,7 @@ def deepest(one, other, clearance, grain, bound, model, faces, place, point, nea
         clearance: how far it should stay away, metres; negative, how deep it may run.
         grain: the least step, metres.
         bound: radius about the model's centroid that holds the solid.
-        model: see `search_kernels.search_model`.
+        model: see `pose.ModelTest`.
         faces: how many of its features are faces.
         place: (3,) the place found, written in place.
         point: (3,) work space.

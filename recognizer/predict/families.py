@@ -14,7 +14,7 @@ from ..contacts.contacts import Contacts
 from ..contacts.support import SupportPlane
 from ..poses.fits.pose import kernel_contacts
 from ..poses.fits.spread_kernels import DRAWS, LINES, spread_over_families
-from ..poses.search.solid import SolidEntry
+from ..poses.solid import SolidEntry
 
 SEED = 738
 """Of the random numbers, which are always the same: samples are a rule of the belief."""

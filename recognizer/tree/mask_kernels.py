@@ -47,7 +47,7 @@ def pair_readings(contacts, errors, readings):
     """What two contacts show of each other, for i < j.
 
     Args:
-        contacts: see `search_kernels.search_model`.
+        contacts: see `pose.kernel_contacts`.
         errors: (n,) bounds on normals, radians.
         readings: (n, n, 9) written in place: distance, angle between the normals, angles of the
             vector between the contacts against either normal, and the bound on the distance; least
@@ -181,3 +181,15 @@ def count_bits(word):
 def bit_index(single):
     """The place of the only bit set in a word."""
     return int(_PLACES[(single * _DE_BRUIJN) >> np.uint64(58)])
+
+
+@borrowing
+def take_lowest(members):
+    """Take the lowest feature out of a (w,) bit set; -1 if it is empty."""
+    for w in range(len(members)):
+        bits = members[w]
+        if bits != _NONE:
+            lowest = bits & (~bits + _ONE)
+            members[w] = bits ^ lowest
+            return w * 64 + bit_index(lowest)
+    return -1

@@ -195,7 +195,7 @@ def _most_nodes(contacts: Contacts) -> int:
 
 
 def _nodes(belief: Belief) -> int:
-    return sum(int(search.nodes.sum()) for search in belief.searches)
+    return sum(search.nodes for search in belief.searches)
 
 
 def _shared(earlier: Beliefs, contacts: Contacts) -> dict[int, Belief]:

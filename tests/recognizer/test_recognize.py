@@ -59,12 +59,12 @@ def assert_consistent(belief: Belief, contacts: Contacts, names: tuple[str, ...]
         own = [h for h in belief.hypotheses if h.object_name == search.object_name]
         rows = [tuple(row) for h in own for row in h.interpretations.tolist()]
         assert search.hypotheses == len(own)
-        assert search.tested == len(rows) == len(set(rows))
-        assert search.pruned >= search.tested
-        assert search.nodes.shape == (len(contacts),)
-        assert (search.nodes > 0).all() or search.tested == 0
+        # An interpretation may have several components, in one hypothesis or in more.
+        assert search.tested >= len(rows) >= len(set(rows)) > 0 or not rows
+        assert search.tried > 0 or search.tested == 0
+        assert search.nodes > 0 or search.tested == 0
         assert min(search.search_seconds, search.cluster_seconds) >= 0.0
-    assert belief.interpretations == sum(search.tested for search in belief.searches)
+    assert belief.interpretations <= sum(search.tested for search in belief.searches)
     assert belief.complete == all(search.complete for search in belief.searches)
     for hypothesis in belief.hypotheses:
         assert hypothesis.interpretations.shape[1] == len(contacts)
@@ -410,8 +410,7 @@ def hand_made(count: int, *, determined: bool, complete: bool) -> Belief:
         for k in range(count)
     )
     searches = tuple(
-        Search(f"object {k}", np.ones(3, np.int64), 2, 2, 1, complete or k != 1, 0, 0.0, 0.0)
-        for k in range(2)
+        Search(f"object {k}", 6, 2, 2, 1, complete or k != 1, 0.0, 0.0) for k in range(2)
     )
     known = Recognizer([CUBE])
     return Belief(hypotheses, searches, Contacts.none(), known.library, known.tolerance)

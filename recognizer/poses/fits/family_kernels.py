@@ -52,7 +52,7 @@ def span_family(
 
     Args:
         faces: (n,) the feature of each contact, -1 for none.
-        contacts: see `search_kernels.search_model`.
+        contacts: see `pose.kernel_contacts`.
         model: likewise.
         rotation: (3, 3) the first pose.
         translation: (3,) likewise.

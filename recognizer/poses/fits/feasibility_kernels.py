@@ -43,7 +43,7 @@ def _assemble_barrier(
         faces: (n,) the feature of each contact, -1 for none.
         x: (n, 3) contacts, object frame.
         u: (n, 3) measured normals, object frame.
-        model: see `search_kernels.search_model`.
+        model: see `pose.ModelTest`.
         contacts: likewise.
         readings: see `reading_kernels.read`.
         system: (7, 7) lower triangle of the Hessian in motion and level, written in place.
@@ -164,7 +164,7 @@ def seek_feasible(
         count: how many contacts count.
         faces: (n,) the feature of each contact, -1 for none.
         targets: (n,) the polygon that stands for that feature.
-        contacts: see `search_kernels.search_model`.
+        contacts: see `pose.kernel_contacts`.
         model: likewise.
         most: the most Newton steps.
         prove: whether to try for a proof, and to stay in the ball.

@@ -36,7 +36,7 @@ def assemble_fit(bounded, count, faces, x, u, model, contacts, readings, system,
         faces: (n,) the feature of each contact, -1 for none.
         x: (n, 3) contacts, object frame.
         u: (n, 3) measured normals, object frame.
-        model: see `search_kernels.search_model`.
+        model: see `pose.ModelTest`.
         contacts: likewise.
         readings: see `reading_kernels.read`, which must have run.
         system: (6, 6) lower triangle written in place.
@@ -124,7 +124,7 @@ def fit_pose(count, faces, contacts, model, most, rotation, translation, work):
     Args:
         count: how many contacts count.
         faces: (n,) the feature of each contact, -1 for none.
-        contacts: see `search_kernels.search_model`.
+        contacts: see `pose.kernel_contacts`.
         model: likewise.
         most: the most steps.
         rotation: (3, 3) object to world.

@@ -46,6 +46,9 @@ class Poses:
     its centroid times its radius, then shift; inverse square metres."""
     proven: NDArray[np.bool_]
     """(m,) whether the pose meets every bound; else none was found and none excluded."""
+    reaches: Floats
+    """(m, 2) how far any pose it stands for can be from it: the turn, radians, and the way of the
+    object's centroid, metres; infinite where that isn't known."""
 
     def __len__(self) -> int:
         return len(self.faces)
@@ -59,6 +62,7 @@ class Poses:
             self.costs[rows],
             self.informations[rows],
             self.proven[rows],
+            self.reaches[rows],
         )
 
     @classmethod
@@ -71,7 +75,13 @@ KernelContacts = tuple[Floats, Floats, Floats, Floats, Floats]
 
 
 def kernel_contacts(contacts: Contacts) -> KernelContacts:
-    """Contacts as the kernels read them: see `search_kernels.search_model`."""
+    """Contacts as the kernels read them.
+
+    Returns:
+        Positions (n, 3), metres, and unit normals (n, 3), world frame; bounds on distances (n,),
+        metres, on chords between normals (n,; 2 if unknown) and on sines of the angle between them
+        (n,; 1 if it may be a right angle).
+    """
     errors = contacts.normal_error
     # Copies: the kernels would be compiled again for arrays that can't be written.
     return (
@@ -84,7 +94,13 @@ def kernel_contacts(contacts: Contacts) -> KernelContacts:
 
 
 class ModelTest:
-    """The model test for one model; holds the model as the kernels read it."""
+    """The model test for one model; holds the model as the kernels read it.
+
+    That is `model`: normals (f, 3) and offsets (f,) of the features' planes; (f + 1,) the first
+    convex piece of each feature; (p + 1,) the first corner of each polygon, of which the first f
+    are the features' hulls and the rest their pieces; corners (c, 3); centroid (3,); radius,
+    metres; (f + 1,) the first normal of each feature's cone; normals (k, 3).
+    """
 
     def __init__(
         self,
@@ -136,7 +152,8 @@ class ModelTest:
             self.pool,
         )
         proven = verdicts == FEASIBLE
-        poses = Poses(interpretations, turns, shifts, costs, informations, proven)
+        unknown = np.full((len(turns), 2), np.inf)
+        poses = Poses(interpretations, turns, shifts, costs, informations, proven, unknown)
         return poses.take(verdicts != REJECTED)
 
     def span(

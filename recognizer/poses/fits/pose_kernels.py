@@ -100,7 +100,7 @@ def settle(count, faces, contacts, model, ball, angle, most, rotation, translati
     Args:
         count: how many contacts count.
         faces: (n,) the feature of each contact, -1 for none.
-        contacts: see `search_kernels.search_model`.
+        contacts: see `pose.kernel_contacts`.
         model: likewise.
         ball: (3, 3) a rotation, near the starting one, that none within the bounds is farther from
             than ...
@@ -145,7 +145,7 @@ def test_interpretations(interpretations, contacts, model, half_angles, middles,
 
     Args:
         interpretations: (m, n) a feature for each contact, -1 for none.
-        contacts: see `search_kernels.search_model`.
+        contacts: see `pose.kernel_contacts`.
         model: likewise.
         half_angles: likewise.
         middles: likewise.

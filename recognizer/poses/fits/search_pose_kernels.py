@@ -95,7 +95,7 @@ def search_poses(count, faces, contacts, model, angle, most, rotation, translati
     Args:
         count: how many contacts count.
         faces: (n,) the feature of each contact, -1 for none.
-        contacts: see `search_kernels.search_model`.
+        contacts: see `pose.kernel_contacts`.
         model: likewise.
         angle: an angle from the starting rotation that no rotation within the bounds exceeds.
         most: the most boxes to look at.

@@ -84,7 +84,7 @@ def _walk(count, faces, contacts, model, draws, rotation, translation, poses, sp
     Args:
         count: how many contacts there are.
         faces: (n,) the feature of each contact, -1 for none.
-        contacts: see `search_kernels.search_model`.
+        contacts: see `pose.kernel_contacts`.
         model: likewise.
         draws: (LINES, 7 + DRAWS) six normal numbers a line, then uniform ones.
         rotation: (3, 3) of the pose.
@@ -125,7 +125,7 @@ def spread_over_families(
 
     Args:
         faces: (h, n) the features of the contacts, -1 for none, in each interpretation.
-        contacts: see `search_kernels.search_model`.
+        contacts: see `pose.kernel_contacts`.
         model: likewise.
         starts: (h, 3, 3) and (h, 3) a pose of each, the first of its samples.
         motions: (h, 6, 6) unit small motions (see `motion_kernels`), zero where there are fewer.

@@ -57,7 +57,7 @@ def judge(
         count: how many contacts count.
         faces: (n,) the feature of each contact, -1 for none.
         targets: (n,) the polygon that stands for it.
-        contacts: see `search_kernels.search_model`.
+        contacts: see `pose.kernel_contacts`.
         model: likewise.
         ball: (3, 3) a rotation, near the starting one, that none within the bounds is farther from
             than ...

@@ -60,9 +60,9 @@ def align(count, faces, model, half_angles, contacts, rotation):
     Args:
         count: how many contacts count.
         faces: (n,) the feature of each contact, -1 for none.
-        model: see `search_kernels.search_model`.
+        model: see `pose.ModelTest`.
         half_angles: (f,) how far a feature's normals lean from its middle one, radians.
-        contacts: see `search_kernels.search_model`.
+        contacts: see `pose.kernel_contacts`.
         rotation: (3, 3) object to world, written in place.
 
     Returns:

@@ -32,7 +32,7 @@ def note_cones(count, faces, u, normals, contacts, readings, table):
         faces: (n,) the feature of each, -1 for none.
         u: (n, 3) measured normals, object frame.
         normals: (f, 3) normals of the features' planes.
-        contacts: see `search_kernels.search_model`.
+        contacts: see `pose.kernel_contacts`.
         readings: see `reading_kernels.read`.
         table: see `cone_table`; written in place.
     """

@@ -140,7 +140,7 @@ def add_contact(contact, f, polygon, model, bounds, axes, box, used, table, spac
         contact: its place (3,), metres, its lever (3,) and its measured normal (3,), object frame.
         f: the feature.
         polygon: the polygon that stands for it.
-        model: see `search_kernels.search_model`.
+        model: see `pose.ModelTest`.
         bounds: on the distance, metres, on the chord and on the sine (see there).
         axes: (3, 3) columns, right-handed, object frame.
         box: (6,) low, (6,) high, and a bound on the square of its turns.

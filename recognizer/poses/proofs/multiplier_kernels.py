@@ -138,7 +138,7 @@ def set_multipliers(
         levers: (n, 3) contacts less the pivot, object frame.
         u: (n, 3) measured normals, object frame.
         normals: (f, 3) normals of the features' planes.
-        contacts: see `search_kernels.search_model`.
+        contacts: see `pose.kernel_contacts`.
         readings: see `reading_kernels.read`.
         weights: (n, 2) of positions and normals.
         step: (6,) the weighted fit's.

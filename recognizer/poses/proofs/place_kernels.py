@@ -59,7 +59,7 @@ def note_places(count, faces, targets, x, levers, model, reaches, readings, tabl
         targets: (n,) the polygon that stands for it.
         x: (n, 3) contacts, object frame, metres.
         levers: (n, 3) contacts less the pivot.
-        model: see `search_kernels.search_model`.
+        model: see `pose.ModelTest`.
         reaches: (n,) bounds on distances, metres.
         readings: see `reading_kernels.read`.
         table: see `place_table`; written in place.

@@ -49,7 +49,7 @@ def plain_margin(count, faces, targets, x, u, levers, model, contacts, readings,
         x: (n, 3) contacts, object frame.
         u: (n, 3) measured normals, object frame.
         levers: (n, 3) contacts less the pivot.
-        model: see `search_kernels.search_model`.
+        model: see `pose.ModelTest`.
         contacts: likewise.
         readings: see `reading_kernels.read`.
         proof: `multiplier_kernels.set_multipliers`; gradient (6,) and form (3, 3) of what they ask
@@ -271,7 +271,7 @@ def disprove(count, faces, targets, model, contacts, rotation, ball, angle, alwa
         count: how many contacts count.
         faces: (n,) the feature of each contact, -1 for none.
         targets: (n,) the polygon that stands for it.
-        model: see `search_kernels.search_model`.
+        model: see `pose.ModelTest`.
         contacts: likewise.
         rotation: (3, 3) object to world, of the pose that has been read.
         ball: (3, 3) a rotation that none within the bounds is farther from than ...

@@ -228,7 +228,7 @@ def bound_region(
         x: (n, 3) contacts, object frame, metres.
         levers: (n, 3) contacts less the pivot.
         u: (n, 3) measured normals, object frame.
-        model: see `search_kernels.search_model`.
+        model: see `pose.ModelTest`.
         contacts: likewise.
         readings: see `reading_kernels.read`.
         reach: a shift of the pivot that no pose within the bounds exceeds, metres.

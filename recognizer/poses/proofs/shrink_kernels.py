@@ -77,7 +77,7 @@ def shrink_box(
         x: (n, 3) contacts, object frame, metres.
         levers: (n, 3) contacts less the pivot.
         u: (n, 3) measured normals, object frame.
-        model: see `search_kernels.search_model`.
+        model: see `pose.ModelTest`.
         contacts: likewise.
         region: about the pose that these are read at; see `region_kernels.region_workspace`.
         axes: (3, 3) columns, right-handed, object frame.

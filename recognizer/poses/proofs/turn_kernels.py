@@ -42,7 +42,7 @@ def note_turns(count, faces, contacts, model, space):
     Args:
         count: how many contacts count.
         faces: (n,) the feature of each contact, -1 for none.
-        contacts: see `search_kernels.search_model`.
+        contacts: see `pose.kernel_contacts`.
         model: likewise.
         space: see `turn_space`, written in place.
     """

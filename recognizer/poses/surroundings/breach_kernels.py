@@ -56,7 +56,7 @@ def pierced_paths(paths, pose, bound, model, solid_faces, broken, worst_places, 
         paths: see `cut_kernels.clear_pose`.
         pose: rotation and translation.
         bound: radius about the centroid that holds the solid.
-        model: see `search_kernels.search_model`.
+        model: see `pose.ModelTest`.
         solid_faces: how many of its features are faces.
         broken: (m,) the paths, written in place.
         worst_places: (m, 3) the deepest place of each, object frame, likewise.

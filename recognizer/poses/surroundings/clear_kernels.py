@@ -60,7 +60,7 @@ def clear_pose(
     Args:
         count: how many contacts there are.
         faces: (count + CUTS,) the feature of each contact, -1 for none; then the cuts' own.
-        contacts: see `search_kernels.search_model`, with ``CUTS`` rows to spare.
+        contacts: see `pose.kernel_contacts`, with ``CUTS`` rows to spare.
         model: likewise, with slots for cuts behind its own features: see `surroundings.with_slots`.
         solid_faces: how many of the features are faces of the solid.
         features: how many features there are besides the slots.

@@ -281,7 +281,7 @@ def bound_rows(
 
     Args:
         faces: (n,) the feature of each contact, -1 for none.
-        contacts: see `search_kernels.search_model`.
+        contacts: see `pose.kernel_contacts`.
         model: likewise.
         solid_faces: how many of the features are faces of the solid.
         bound: radius about the centroid that holds the solid, metres.

@@ -112,7 +112,19 @@ def clear(
         again = _clear(cleared, found, bounds, half_angles, count)
         verdicts[found & (again == FEASIBLE)] = FEASIBLE
     proven = verdicts == FEASIBLE
-    return replace(cleared, proven=proven).take(verdicts != REJECTED)
+    # What a pose was moved by, it may be farther from the others.
+    reaches = poses.reaches + _moved(model, poses, cleared)
+    return replace(cleared, proven=proven, reaches=reaches).take(verdicts != REJECTED)
+
+
+def _moved(model: Polyhedron, before: Poses, after: Poses) -> Floats:
+    """(m, 2) how far poses were moved: the turn, radians, and the way of the centroid, metres."""
+    turns = np.einsum("mab,mab->m", before.rotations, after.rotations)
+    ways = (after.rotations - before.rotations) @ model.centroid
+    ways += after.translations - before.translations
+    return np.column_stack(
+        [np.arccos(np.clip((turns - 1.0) / 2.0, -1.0, 1.0)), np.linalg.norm(ways, axis=1)]
+    )
 
 
 def bounds_of(

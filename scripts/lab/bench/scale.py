@@ -81,7 +81,7 @@ def _library_rows(
         beliefs.append(belief)
         held += case.held_by(belief)
     left = [len({h.object_name for h in belief.hypotheses}) for belief in beliefs]
-    searched = [sum(bool(s.nodes.any()) for s in belief.searches) for belief in beliefs]
+    searched = [sum(s.nodes > 0 for s in belief.searches) for belief in beliefs]
     within = sum(spent <= GOAL for spent in seconds)
     faces = [model.face_count for model in models]
     return [

@@ -123,7 +123,7 @@ def _floor(
         contacts = case.contacts[spread_order(case.contacts)]
         compared, anded, spent = 0, 0, 0.0
         for table, search in zip(tables, belief.searches, strict=True):
-            if not search.nodes.any():
+            if not search.nodes:
                 continue
             pruned, own = timed(prune, table, contacts, sort=False, budget=FLOOR_BUDGET)
             counts = operations(table.face_count, pruned.nodes)

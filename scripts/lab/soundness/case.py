@@ -66,7 +66,7 @@ class Case:
             freedoms=np.eye(6),
             covariance=np.eye(6),
         )
-        search = Search.none(self.model.name, self.told)
+        search = Search.none(self.model.name)
         return Belief(
             (truth,),
             (search,),

@@ -44,11 +44,25 @@ def true_hypotheses(case: Case, belief: Belief, possible: Booleans) -> list[Hypo
         hypothesis
         for hypothesis in belief.hypotheses
         if hypothesis.object_name == case.model.name
+        and _reaches_truth(case, hypothesis)
         and any(
             bool(possible[rows, image[hypothesis.interpretations]].all(axis=1).any())
             for image in images
         )
     ]
+
+
+def _reaches_truth(case: Case, hypothesis: Hypothesis) -> bool:
+    """Whether a hypothesis says that its poses reach as far as the true one, or a copy of it."""
+    if isinstance(case.model, Polygon):
+        return True
+    turns = hypothesis.pose.rotation.inv() * case.truth.rotation
+    symmetries = Rotation.from_matrix(case.model.symmetries)
+    turn = float((turns * symmetries).magnitude().min())
+    centre = case.model.centroid.copy()
+    way = float(np.linalg.norm(hypothesis.pose.apply(centre) - case.truth.apply(centre)))
+    slack = ROUNDING * case.model.diameter
+    return turn <= hypothesis.farthest_turn + ROUNDING and way <= hypothesis.farthest_shift + slack
 
 
 def false_reports(case: Case, possible: Booleans) -> list[str]:

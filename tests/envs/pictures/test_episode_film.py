@@ -48,7 +48,7 @@ def record_of(**arguments) -> EpisodeRecord:
 def record() -> EpisodeRecord:
     """Two probes: the first leaves a hundred hypotheses, the second one."""
     made = record_of()
-    assert [len(probed.belief.hypotheses) for probed in made.probes if probed.belief] == [100, 1]
+    assert [len(probed.belief.hypotheses) for probed in made.probes if probed.belief] == [102, 1]
     return made
 
 
@@ -172,7 +172,7 @@ def test_captions_tell_what_is_left(shots):
     told = list(dict.fromkeys((shot.caption.title, shot.caption.subtitle) for shot in shots))
     assert [title for title, _ in told[1:-1]] == ["Probe 1 of 2"] * 2 + ["Probe 2 of 2"] * 2
     assert told[1][1] == "Nothing touched yet"
-    assert told[2][1].startswith("100 hypotheses left: ")
+    assert told[2][1].startswith("102 hypotheses left: ")
     assert told[2][1] == told[3][1]
     assert told[4][1].startswith("1 hypothesis left: complex-hand")
 

@@ -43,6 +43,7 @@ def placed(model: Polyhedron, turns: list[Rotation], centres: NDArray[np.float64
         costs=np.arange(count, dtype=float),
         informations=np.tile(1e10 * np.eye(6), (count, 1, 1)),
         proven=np.ones(count, bool),
+        reaches=np.zeros((count, 2)),
     )
 
 

@@ -176,7 +176,7 @@ def test_determined_poses_are_near_the_truth():
 
 def test_a_stage_by_stage_search_finds_what_one_at_a_time_and_all_at_once_find():
     case = felt_outline("hand", 7, 3, dist=0.02, missing=0.5)
-    kinds = ({}, {"crowd": 1}, {"flood": 3}, {"first_stage": 1, "stage": 1}, {"crowd": 10**6})
+    kinds = ({}, {"few": 1}, {"flood": 3}, {"first_stage": 1, "stage": 1}, {"few": 10**6})
     found = []
     for limits in kinds:
         hypotheses, _, _ = search("hand", case.contacts, **limits)
@@ -191,7 +191,7 @@ def test_what_fits_no_outline_has_no_hypothesis():
     hypotheses, log_weights, found = search("gator", apart)
     assert hypotheses == []
     assert log_weights.shape == (0,)
-    assert (found.pruned, found.tested, found.hypotheses) == (0, 0, 0)
+    assert (found.tried, found.tested, found.hypotheses) == (0, 0, 0)
     assert found.complete
 
 

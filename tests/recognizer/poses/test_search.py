@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import replace
 from typing import Literal
 
 import numpy as np
@@ -14,16 +13,11 @@ from helpers.sensing import INCH, SMALL, feel, forget_normals, sense_grid, touch
 from numpy.typing import NDArray
 from oracles import solids as oracles
 from oracles.checker import check
-from oracles.geometry import cone_angles, triangle_distances
-from oracles.proof_samples import STAND_INS, TESTS, direction, draw, read_at, start_near
-from scipy.spatial.transform import Rotation
+from oracles.proof_samples import STAND_INS, TESTS, draw
 
 from palpate.recognizer import Belief, Contacts, PairTables, Polyhedron, Recognizer, SearchLimits
 from palpate.recognizer.models.features import Features, all_features, face_features
 from palpate.recognizer.poses.fits.pose import ModelTest, kernel_contacts
-from palpate.recognizer.poses.proofs.possible_kernels import possible
-from palpate.recognizer.poses.proofs.proof_kernels import locate, workspace
-from palpate.recognizer.poses.proofs.region_kernels import square_root
 from palpate.recognizer.tables.ranges import pack_tables
 from palpate.recognizer.tree.mask_kernels import narrow, pair_readings
 from palpate.recognizer.tree.tree import prune
@@ -31,121 +25,6 @@ from palpate.recognizer.tree.tree import prune
 Floats = NDArray[np.float64]
 ROWS = ((np.pi / 12, 0.01), (np.pi / 10, 0.01), (np.pi / 8, 0.05), (np.pi / 8, 0.1))
 """Bounds on normals (radians) and positions (inches)."""
-
-
-def test_the_look_ahead_never_drops_the_feature_that_a_further_contact_is_on() -> None:
-    rng, near, row, root = np.random.default_rng(12), np.empty(3), np.empty(6), np.empty((3, 3))
-    tried, dropped = 0, 0
-    for case in range(600):
-        sample = draw(rng, 2)
-        if case % 2:
-            # Known contacts close together, and a further one at a long lever.
-            touches, normal = sample.touches, rng.choice([0.003, 0.01, 0.03])
-            apart = np.linalg.norm(touches.points - touches.points[0], axis=1)
-            touches = touches[apart.argsort()]
-            contacts = feel(touches, rng, 0.001 * INCH, normal, at_bounds=case % 4 == 1)
-            sample = replace(sample, touches=touches, contacts=contacts)
-        known = int(rng.integers(1, len(sample.contacts)))
-        if (sample.faces[:known] < 0).all():
-            continue
-        angle = 0.1 if case % 2 else rng.choice([0.03, 0.3, 1.0])
-        ball, rotation, translation = start_near(sample, rng, angle)
-        work, _ = read_at(sample, rotation, translation)
-        _, faces, _, model, contacts = sample.question
-        bound, _ = locate(known, *sample.question[1:], rotation, ball, angle, work)
-        square_root(work[1][0], root)
-        x, u, pivot = work[3][0], work[3][1], work[5][2]
-        for j in range(known, len(sample.contacts)):
-            for f in (faces[j], *rng.integers(len(sample.features), size=3)):
-                if faces[j] < 0:
-                    continue
-                fits = possible(
-                    *(x[j], u[j], x[j] - pivot, f, contacts[2][j], contacts[3][j], contacts[4][j]),
-                    *(model, bound, work[1], root, row, near),
-                )
-                assert fits or f != faces[j], f"case {case}: the true feature was dropped"
-                tried, dropped = tried + 1, dropped + (not fits)
-    assert dropped > 0.1 * tried
-
-
-def contact_on(
-    features: Features, f: int, rng: np.random.Generator, reach: float, lean: float
-) -> tuple[Floats, Floats]:
-    """A contact and a normal, object frame, a distance and an angle from any of a feature's own."""
-    corners = features.corners[features.start[f] : features.start[f + 1]]
-    cone = features.cone_normals[features.cone_start[f] : features.cone_start[f + 1]]
-    place = rng.dirichlet(np.full(len(corners), 0.5)) @ corners
-    normal = rng.dirichlet(np.full(len(cone), 0.5)) @ cone
-    normal /= np.linalg.norm(normal)
-    # Beyond an edge's end, but off its very line: that has a test of its own.
-    outwards = place - corners.mean(axis=0) + 1e-5 * direction(rng)
-    away = (normal, -normal, outwards, direction(rng))[rng.integers(4)]
-    away = away / np.linalg.norm(away)
-    axis = np.cross(normal, direction(rng))
-    turn = Rotation.from_rotvec(lean * axis / np.linalg.norm(axis))
-    return place + reach * away, turn.apply(normal)
-
-
-def ask_possible(
-    test: ModelTest,
-    f: int,
-    here: tuple[Floats, Floats, Floats],
-    bounds: tuple[float, float],
-    motion: Floats,
-    share: float,
-) -> bool:
-    """`possible` for the region of the motions from a share of one to all of it."""
-    region, root = workspace(1)[1], np.empty((3, 3))
-    half = 0.5 * (1.0 - share) * motion
-    region[0][:] = np.outer(motion[:3], motion[:3])
-    region[1][:], region[2][:] = np.outer(half, half), motion - half
-    square_root(region[0], root)
-    x, u, lever = here
-    reach, lean = bounds
-    angle = float(np.linalg.norm(motion[:3]))
-    chord, sine = 2.0 * np.sin(0.5 * lean), np.sin(min(lean, 0.5 * np.pi))
-    return possible(
-        *(x, u, lever, f, reach, chord, sine, test.model, angle),
-        *(region, root, np.empty(6), np.empty(3)),
-    )
-
-
-def test_a_feature_that_a_pose_of_a_region_brings_within_the_bounds_is_possible() -> None:
-    rng = np.random.default_rng(26)
-    for case in range(2000):
-        _, test = TESTS[rng.integers(len(TESTS))]
-        f = int(rng.integers(len(test.features)))
-        reach, lean = rng.choice([1e-4, 1e-3]), rng.choice([0.02, 0.3, 1.5, 2.5, np.pi])
-        hair = 1.0 - 1e-6
-        there, normal = contact_on(test.features, f, rng, hair * reach, hair * lean)
-        w = direction(rng) * rng.choice([0.0, 1e-3, 0.1, 1.0])
-        s = direction(rng) * rng.choice([0.0, 1e-3, 0.03])
-        lever = direction(rng) * rng.choice([0.0, 0.01, 0.1])
-        # Where the region's own pose has them: x' = exp(-w) a + pivot - s with the lever a.
-        turn = Rotation.from_rotvec(w)
-        here = there + s - turn.inv().apply(lever) + lever, turn.apply(normal), lever
-        motion, share = np.concatenate([w, s]), rng.choice([0.0, 0.5, 1.0])
-        assert ask_possible(test, f, here, (reach, lean), motion, share), f"case {case}"
-
-
-def test_at_one_pose_those_features_are_possible_whose_bounds_are_met() -> None:
-    rng, seen = np.random.default_rng(27), Counter()
-    for _ in range(1500):
-        _, test = TESTS[rng.integers(len(TESTS))]
-        features, f = test.features, int(rng.integers(len(test.features)))
-        reach, lean = 1e-3, rng.choice([0.02, 0.3, 1.5, 2.5, np.pi])
-        off, leaning = rng.uniform(0.5, 1.5, 2) if rng.random() < 0.5 else rng.uniform(0, 50, 2)
-        x, u = contact_on(features, f, rng, off * reach, min(np.pi, leaning * lean))
-        hull = features.corners[features.start[f] : features.start[f + 1]]
-        cone = features.cone_normals[features.cone_start[f] : features.cone_start[f + 1]]
-        fan = [hull[[0, k, min(k + 1, len(hull) - 1)]] for k in range(max(1, len(hull) - 1))]
-        distance, angle = triangle_distances(x[None], np.array(fan)).min(), cone_angles(u, cone)
-        expected = bool(distance <= reach and angle <= lean)
-        if min(abs(distance / reach - 1.0), abs(angle / lean - 1.0)) > 1e-6:
-            here = x, u, direction(rng)
-            assert ask_possible(test, f, here, (reach, lean), np.zeros(6), 1.0) == expected
-            seen[expected] += 1
-    assert min(seen.values()) > 150
 
 
 def pairs_that_fit(

@@ -10,13 +10,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ...contacts.support import FOOTING, StableFace, stable_faces
-from ...models.features import Features, all_features, face_features, with_squares
-from ...models.permutations import feature_permutations
-from ...models.polyhedron import Polyhedron
-from ...tables.ranges import PairTables, pack_tables
-from ...tables.table_cache import cached_tables
-from ..fits.pose import ModelTest
+from ..contacts.support import FOOTING, StableFace, stable_faces
+from ..models.features import Features, all_features, face_features, with_squares
+from ..models.permutations import feature_permutations
+from ..models.polyhedron import Polyhedron
+from ..tables.ranges import PairTables, pack_tables
+from ..tables.table_cache import cached_tables
+from .fits.pose import ModelTest
+from .shape import Shape, shape_of
 
 Bits = NDArray[np.uint64]
 """Sets of features: of each, one bit in rows of 64-bit words."""
@@ -49,6 +50,11 @@ class SolidEntry:
             else cached_tables(model, folder, features=features if edges else None)
         )
         return cls(model, features, tables, ModelTest(model, features), pack_tables(tables))
+
+    @cached_property
+    def shape(self) -> Shape:
+        """The features as the cover's kernels read them."""
+        return shape_of(self.features, self.test.radius)
 
     @cached_property
     def permutations(self) -> tuple[NDArray[np.int32], float]:

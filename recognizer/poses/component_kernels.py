@@ -1,0 +1,218 @@
+"""Compiled components of a cover: leaves of one interpretation whose boxes overlap.
+
+Of each a pose is reported, the best fit if it is in the component, and how far any pose of the
+component can be from it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..compiling import borrowing, kernel
+from .boxes_kernels import cayley, gibbs_between, recentre
+from .fits.pose_kernels import finish, weigh
+from .motions.motion_kernels import copy_pose
+from .proofs.proof_kernels import workspace
+
+TOUCHING = 1e-9
+"""Boxes as near as this overlap: rounding."""
+
+
+@borrowing
+def corner_of(leaves, at, corner, turn, rotation, g):
+    """The rotation (3, 3), world to object, at a corner of a leaf's box, in place."""
+    for k in range(3):
+        g[k] = leaves.highs[at, k] if corner >> k & 1 else leaves.lows[at, k]
+    cayley(g, turn)
+    for a in range(3):
+        for b in range(3):
+            rotation[a, b] = 0.0
+            for k in range(3):
+                rotation[a, b] += turn[a, k] * leaves.charts[at, k, b]
+
+
+@borrowing
+def overlap(one, other, leaves, middles, halves, angles, space):
+    """Whether the boxes of two leaves may have a pose in common."""
+    turn, rotation, g = space
+    for k in range(3):
+        low = max(leaves.rooms[one, k, 0], leaves.rooms[other, k, 0])
+        if low > min(leaves.rooms[one, k, 1], leaves.rooms[other, k, 1]) + TOUCHING:
+            return False
+    trace = 0.0
+    for a in range(3):
+        for b in range(3):
+            trace += middles[one, a, b] * middles[other, a, b]
+    reach = angles[one] + angles[other] + TOUCHING
+    if reach < np.pi and trace < 1.0 + 2.0 * np.cos(reach):
+        return False
+    for k in range(3):
+        least, most = np.inf, -np.inf
+        for corner in range(8):
+            corner_of(leaves, other, corner, turn, rotation, g)
+            if not gibbs_between(middles[one], rotation, g):
+                return True
+            least, most = min(least, g[k]), max(most, g[k])
+        if 2.0 * least > halves[one, k] + TOUCHING or 2.0 * most < -halves[one, k] - TOUCHING:
+            return False
+    return True
+
+
+@kernel
+def link_leaves(leaves, interpretations):
+    """Number the components of a cover.
+
+    Args:
+        leaves: see `cover.Leaves`.
+        interpretations: (m,) the interpretation of each leaf, as a number.
+
+    Returns:
+        (m,) the component of each leaf, numbered as they come, and how many there are.
+    """
+    count = len(interpretations)
+    labels = np.full(count, -1, np.int64)
+    middles, halves, angles = np.empty((count, 3, 3)), np.empty((count, 3)), np.empty(count)
+    space = (np.empty((3, 3)), np.empty((3, 3)), np.empty(3))
+    for m in range(count):
+        angles[m] = recentre(
+            leaves.charts[m], leaves.lows[m], leaves.highs[m], space[0], halves[m], middles[m]
+        )
+    found = 0
+    waiting = np.empty(count, np.int64)
+    for seed in range(count):
+        if labels[seed] >= 0:
+            continue
+        labels[seed] = found
+        waiting[0], height = seed, 1
+        while height > 0:
+            height -= 1
+            m = waiting[height]
+            for other in range(count):
+                if (
+                    labels[other] < 0
+                    and interpretations[other] == interpretations[m]
+                    and overlap(m, other, leaves, middles, halves, angles, space)
+                ):
+                    labels[other] = found
+                    waiting[height] = other
+                    height += 1
+        found += 1
+    return labels, found
+
+
+@borrowing
+def within(at, leaves, rotation, shift, g):
+    """Whether a pose, world to object, with a shift in radii, is in a leaf's box."""
+    for k in range(3):
+        if not leaves.rooms[at, k, 0] <= shift[k] <= leaves.rooms[at, k, 1]:
+            return False
+    if not gibbs_between(leaves.charts[at], rotation, g):
+        return False
+    inside = True
+    for k in range(3):
+        inside &= leaves.lows[at, k] <= g[k] <= leaves.highs[at, k]
+    return inside
+
+
+@borrowing
+def shift_of(rotation, translation, mean, radius, inverse, shift):
+    """A pose, object to world, as its inverse rotation and the contacts' mean in its frame."""
+    for a in range(3):
+        shift[a] = 0.0
+        for b in range(3):
+            inverse[a, b] = rotation[b, a]
+            shift[a] += rotation[b, a] * (mean[b] - translation[b]) / radius
+
+
+@borrowing
+def reach_of(at, leaves, inverse, shift, middle, space):
+    """How far the poses of a leaf's box are from a pose, at most.
+
+    With the shift read in the object's frame, a point that is ``v`` from the contacts' mean moves
+    by no more than the shift changes and the turn moves ``v``.
+
+    Returns:
+        The turn, radians, and how far the object's centroid moves, in radii.
+    """
+    turn, rotation, g = space
+    far = 0.0
+    for corner in range(8):
+        # Seen from the pose the box is the hull of its corners' images.
+        corner_of(leaves, at, corner, turn, rotation, g)
+        if not gibbs_between(inverse, rotation, g):
+            return np.pi, 2.0 + far
+        far = max(far, g[0] ** 2 + g[1] ** 2 + g[2] ** 2)
+    square, arm = 0.0, 0.0
+    for k in range(3):
+        apart = max(leaves.rooms[at, k, 1] - shift[k], shift[k] - leaves.rooms[at, k, 0])
+        square += apart * apart
+        arm += (shift[k] - middle[k]) ** 2
+    # The chord of a turn with tangent t of its half is 2 t / sqrt(1 + t^2).
+    chord = 2.0 * np.sqrt(far / (1.0 + far))
+    return 2.0 * np.arctan(np.sqrt(far)), np.sqrt(square) + chord * np.sqrt(arm)
+
+
+@kernel
+def report_components(leaves, labels, found, contacts, model, mean, radius):
+    """A pose of each component, and how far the others are from it.
+
+    Args:
+        leaves: see `cover.Leaves`.
+        labels: (m,) the component of each.
+        found: how many components there are.
+        contacts: see `pose.kernel_contacts`.
+        model: see `pose.ModelTest`.
+        mean: (3,) of the contacts, metres.
+        radius: metres.
+
+    Returns:
+        (k, n) features; (k, 3, 3) rotations and (k, 3) translations, object to world; (k,) misfits;
+        (k, 6, 6) informations; (k,) whether the pose is a witness; (k, 2) the largest turn to
+        another pose, radians, and the farthest way of the centroid, metres.
+    """
+    n = leaves.fixed.shape[1]
+    faces = np.full((found, n), -1, np.int32)
+    rotations, translations = np.zeros((found, 3, 3)), np.zeros((found, 3))
+    costs, informations = np.zeros(found), np.zeros((found, 6, 6))
+    proven, reaches = np.zeros(found, np.bool_), np.zeros((found, 2))
+    work, space = workspace(n), (np.empty((3, 3)), np.empty((3, 3)), np.empty(3))
+    inverse, shift, features = np.empty((3, 3)), np.empty(3), np.empty(n, np.int64)
+    chosen = np.full(found, -1, np.int64)
+    for m in range(len(labels)):
+        k = labels[m]
+        if chosen[k] < 0 or (leaves.proven[m] and not leaves.proven[chosen[k]]):
+            chosen[k] = m
+    for k in range(found):
+        at = chosen[k]
+        for i in range(n):
+            faces[k, i] = max(leaves.fixed[at, i], -1)
+            features[i] = faces[k, i]
+        proven[k] = leaves.proven[at]
+        copy_pose(leaves.rotations[at], leaves.translations[at], rotations[k], translations[k])
+        if proven[k]:
+            costs[k] = finish(
+                n, features, contacts, model, rotations[k], translations[k], work, informations[k]
+            )
+            shift_of(rotations[k], translations[k], mean, radius, inverse, shift)
+            inside = False
+            for m in range(len(labels)):
+                if labels[m] == k and within(m, leaves, inverse, shift, space[2]):
+                    inside = True
+                    break
+            if inside:
+                continue
+            # The best fit is in another component, which has it already.
+            copy_pose(leaves.rotations[at], leaves.translations[at], rotations[k], translations[k])
+        costs[k] = weigh(
+            n, features, contacts, model, rotations[k], translations[k], work, informations[k]
+        )
+    centre = np.empty(3)
+    for a in range(3):
+        centre[a] = model[5][a] / radius
+    for m in range(len(labels)):
+        k = labels[m]
+        shift_of(rotations[k], translations[k], mean, radius, inverse, shift)
+        turn, way = reach_of(m, leaves, inverse, shift, centre, space)
+        reaches[k, 0] = max(reaches[k, 0], turn)
+        reaches[k, 1] = max(reaches[k, 1], way * radius)
+    return faces, rotations, translations, costs, informations, proven, reaches

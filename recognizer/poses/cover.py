@@ -1,0 +1,329 @@
+"""The cover of all poses of one solid that contacts allow: the search, driven in steps.
+
+Grimson and Lozano-Perez ask for the interpretations of contacts (memo, Sections 2 and 3); this asks
+for the poses. See `cover_kernels`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..contacts.contacts import Contacts
+from .cover_kernels import advance, begin
+from .fits.pose import kernel_contacts
+from .leaf_kernels import COUNTS, CUT, HEIGHT, NODES, TRIED
+from .node_kernels import OPEN
+from .shape import Shape, Touches, touches_of
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Bools = NDArray[np.bool_]
+
+ROWS = 28
+"""Rows of a contact, on average, that there is room for; what finds none is left out."""
+CUTS = 4
+"""Cuts of a contact, likewise."""
+DEEP = 120
+"""Levels of a search, beside one for each contact: a box is cut in two about 30 times across each
+turn until rounding ends it."""
+STEPS = 10_000
+"""Nodes between two looks at the limits: about a tenth of a second."""
+MOST_LEAVES = 256
+"""Leaves that are written at once."""
+
+
+class Tables(NamedTuple):
+    """What pairs of contacts, and pairs of features, say of each other."""
+
+    packed: Floats
+    """See `ranges.pack_tables`."""
+    half_angles: Floats
+    """(f,) see `shape.Shape`."""
+    readings: Floats
+    """(n, n, 9) see `mask_kernels.pair_readings`; either way round."""
+    errors: Floats
+    """(n,) bounds on normals, radians."""
+    switches: int
+    """Bits, which constraints on pairs to apply."""
+
+
+class Aims(NamedTuple):
+    """What a search is to find out, and how it goes about it."""
+
+    spare: int
+    """How many contacts may be on none of the features."""
+    crowd: float
+    """Ways to assign what is left up to which they are tried one by one."""
+    coarse: float
+    """How far turns about a box's axis may move contacts, in radii, when features are tried."""
+    vague: bool
+    """Whether normals don't say where to begin."""
+    turn: float
+    """Poses whose rotations are no farther apart than this, radians, ..."""
+    shift: float
+    """... and whose shifts no farther than this, in radii, are alike."""
+
+
+class Problem(NamedTuple):
+    """All that a search reads."""
+
+    shape: Shape
+    model: Any
+    """See `pose.ModelTest`."""
+    contacts: Any
+    """See `pose.kernel_contacts`."""
+    touches: Touches
+    tables: Tables
+    aims: Aims
+
+
+class Stack(NamedTuple):
+    """Nodes; every array has a row for each."""
+
+    charts: Floats
+    """(3, 3) rotation, world to object, of the Gibbs vector zero."""
+    lows: Floats
+    """(3,) least Gibbs vectors of the box, ..."""
+    highs: Floats
+    """(3,) ... and greatest."""
+    rooms: Floats
+    """(d, 2) least and greatest shift along each direction, in radii."""
+    domains: NDArray[np.uint64]
+    """(n, w) bit sets of the features left to each contact, ..."""
+    sizes: Ints
+    """(n,) ... and how many these are."""
+    fixed: Ints
+    """(n,) the feature that a contact is assigned; see `node_kernels.OPEN`."""
+    targets: Ints
+    """(n,) the polygon that stands for it: its hull, or a piece of a concave face."""
+    boxed: Bools
+    """Whether it has a box; if not, normals say each time what it is."""
+    nulls: Ints
+    """How many contacts are on none."""
+    branching: Ints
+    """The contact of which features are tried; -1 if none is."""
+    null_left: Bools
+    """Whether it is to be tried on none, too."""
+
+
+class Leaves(NamedTuple):
+    """Boxes that together hold all poses; every array has a row for each."""
+
+    fixed: NDArray[np.int32]
+    """(n,) the feature of each contact, below zero for none."""
+    charts: Floats
+    """(3, 3) as of `Stack`."""
+    lows: Floats
+    """(3,) likewise."""
+    highs: Floats
+    """(3,) likewise."""
+    rooms: Floats
+    """(3, 2) least and greatest shift along each axis, in radii."""
+    rotations: Floats
+    """(3, 3) object to world: of a pose in it that meets every bound, or nearly does."""
+    translations: Floats
+    """(3,) metres."""
+    proven: Bools
+    """Whether it meets every bound."""
+
+
+class Work(NamedTuple):
+    """Work space of a search, and what its steps hand to each other."""
+
+    turn: Floats
+    other: Floats
+    middle: Floats
+    """(3, 3) world to object: the middle of the box that was viewed last, ..."""
+    half: Floats
+    """(3,) ... half sides of the turns about it, ..."""
+    arms: Floats
+    """(n, 3) ... contacts about their mean, and ..."""
+    facings: Floats
+    """(n, 3) ... normals, both turned by it, and ..."""
+    ways: Floats
+    """(n, d, 2) ... extents of the arms in the box."""
+    hull: Floats
+    low: Floats
+    """(6,) a box: turns about the middle, radians, then shifts, radii."""
+    high: Floats
+    columns: Floats
+    """(7, m) rows and limits."""
+    programs: Any
+    """See `simplex_kernels.simplex_space`."""
+    objective: Floats
+    seen: Floats
+    sum: Floats
+    """(7,) see `polytope_kernels.tighten`."""
+    cuts: Floats
+    """(c, 4) directions, and how far out along them the polygon reaches, in radii."""
+    cut_of: Ints
+    """(c,) the contact of each."""
+    cut_count: Ints
+    """(1,)"""
+    rotation: Floats
+    translation: Floats
+    seeking: Any
+    """See `witness_kernels.seek_witness`."""
+    best: Floats
+    shift: Floats
+    mean: Floats
+    """(3,) of the contacts, metres."""
+    form: Floats
+    vectors: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class Cover:
+    """What a search found."""
+
+    leaves: Leaves
+    nodes: int
+    """How many nodes were looked at."""
+    tried: int
+    """Searches for a witness."""
+    complete: bool
+    """False if a limit ended it, so that the leaves may not hold all poses."""
+
+
+def search_cover(
+    problem: Problem, domains: NDArray[np.uint64], *, most_nodes: int, most_found: int
+) -> Cover:
+    """Boxes that together hold all poses that contacts allow.
+
+    Args:
+        problem: of one solid; its readings are set in place.
+        domains: (n, w) bit sets, the features that each contact may be on.
+        most_nodes: the most nodes to look at.
+        most_found: the most interpretations to find.
+    """
+    n, words = domains.shape
+    directions = len(problem.shape.directions)
+    stack, work = _stack(n, words, directions), work_space(n, directions, problem.touches.mean)
+    stack.domains[0] = domains
+    stack.rooms[0] = -np.inf, np.inf
+    tables = problem.tables
+    begin(problem.contacts, tables.errors, tables.readings, stack.domains[0], stack.sizes[0])
+    counts = np.zeros(COUNTS, np.int64)
+    counts[HEIGHT] = 1
+    buffer, parts = _leaves(n, MOST_LEAVES), []
+    known: set[bytes] = set()
+    while counts[HEIGHT] > 0 and counts[NODES] < most_nodes and len(known) < most_found:
+        steps = min(STEPS, most_nodes - int(counts[NODES]))
+        # Each may be of another interpretation.
+        room = Leaves._make(array[: most_found - len(known)] for array in buffer)
+        found = advance(problem, stack, room, counts, work, steps)
+        parts.append(Leaves._make(array[:found].copy() for array in buffer))
+        known.update(row.tobytes() for row in parts[-1].fixed)
+    parts = parts or [Leaves._make(array[:0] for array in buffer)]
+    return Cover(
+        join(parts),
+        int(counts[NODES]),
+        int(counts[TRIED]),
+        counts[HEIGHT] == 0 and not counts[CUT],
+    )
+
+
+def join(parts: Sequence[Leaves]) -> Leaves:
+    """The leaves of all parts, at least one, in order."""
+    if len(parts) == 1:
+        return parts[0]
+    return Leaves._make(np.concatenate(arrays) for arrays in zip(*parts, strict=True))
+
+
+def problem_of(
+    shape: Shape, model: Any, packed: Floats, contacts: Contacts, switches: int, aims: Aims
+) -> Problem:
+    """What a search for poses of a solid reads.
+
+    Args:
+        shape: of its features.
+        model: likewise, see `pose.ModelTest`.
+        packed: ranges of its features, see `ranges.pack_tables`.
+        contacts: at least one.
+        switches: bits, which constraints on pairs to apply.
+        aims: what it is to find out.
+    """
+    touches, count = touches_of(contacts, shape.radius), len(contacts)
+    readings = np.empty((count, count, 9))
+    tables = Tables(packed, shape.half_angles, readings, touches.errors, switches)
+    return Problem(shape, model, kernel_contacts(contacts), touches, tables, aims)
+
+
+def _stack(n: int, words: int, directions: int) -> Stack:
+    size, empty = n + DEEP, np.empty
+    return Stack(
+        charts=empty((size, 3, 3)),
+        lows=empty((size, 3)),
+        highs=empty((size, 3)),
+        rooms=empty((size, directions, 2)),
+        domains=empty((size, n, words), np.uint64),
+        sizes=empty((size, n), np.int64),
+        fixed=np.full((size, n), OPEN, np.int64),
+        targets=np.zeros((size, n), np.int64),
+        boxed=np.zeros(size, np.bool_),
+        nulls=np.zeros(size, np.int64),
+        branching=np.full(size, -1, np.int64),
+        null_left=np.zeros(size, np.bool_),
+    )
+
+
+def _leaves(n: int, most: int) -> Leaves:
+    empty = np.empty
+    return Leaves(
+        fixed=empty((most, n), np.int32),
+        charts=empty((most, 3, 3)),
+        lows=empty((most, 3)),
+        highs=empty((most, 3)),
+        rooms=empty((most, 3, 2)),
+        rotations=empty((most, 3, 3)),
+        translations=empty((most, 3)),
+        proven=empty(most, np.bool_),
+    )
+
+
+def work_space(n: int, directions: int, mean: Floats) -> Work:
+    """Work space for so many contacts, of a mean (3,), metres, and directions of slabs."""
+    empty, rows, cuts = np.empty, ROWS * n, CUTS * n
+    readings = (
+        *(empty((n, 3)), empty(n), empty(n), empty(n, np.int64), empty(n, np.int64)),
+        *(empty(n), empty((n, 3))),
+    )
+    return Work(
+        turn=empty((3, 3)),
+        other=empty((3, 3)),
+        middle=empty((3, 3)),
+        half=empty(3),
+        arms=empty((n, 3)),
+        facings=empty((n, 3)),
+        ways=empty((n, directions, 2)),
+        hull=empty((directions, 2)),
+        low=empty(6),
+        high=empty(6),
+        columns=empty((7, rows)),
+        programs=(
+            *(empty(6, np.int64), empty((6, 6)), empty(6), empty(6), empty(6), empty(6)),
+            *(empty(rows), empty(rows), empty(rows), np.zeros(1, np.bool_)),
+        ),
+        objective=empty(6),
+        seen=empty((6, 2)),
+        sum=empty(7),
+        cuts=empty((cuts, 4)),
+        cut_of=empty(cuts, np.int64),
+        cut_count=np.zeros(1, np.int64),
+        rotation=empty((3, 3)),
+        translation=empty(3),
+        seeking=(
+            *(readings, empty((n, 3)), empty((n, 3)), empty((6, 6)), np.zeros((6, 6))),
+            *(empty(6), empty(6), empty(6), empty(3), empty(3), empty(3), empty((3, 3)), empty(3)),
+        ),
+        best=empty((3, 3)),
+        shift=empty(3),
+        mean=mean.copy(),
+        form=empty((4, 4)),
+        vectors=empty((4, 4)),
+    )

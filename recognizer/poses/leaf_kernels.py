@@ -1,0 +1,278 @@
+"""Compiled leaves: nodes whose contacts are all assigned, shrunk until their pose set is known.
+
+Linear programs shrink the box (`polytope_kernels`); an empty polytope is a proof that no pose is
+left. Otherwise a pose is sought that meets every bound (`witness_kernels`). Where none is found,
+the gaps that are left at the end of the search give rows that say more there (cuts), and the
+programs are asked again. A box is a leaf if it has a witness and its poses are alike, or known up
+to little, or farther apart than alike in any case; else it is cut in two.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..compiling import borrowing
+from .boxes_kernels import cayley, gibbs_between
+from .motions.motion_kernels import copy_pose
+from .node_kernels import view
+from .polytope_kernels import tighten
+from .shrink_kernels import cut_rows, keep_box, note_cuts, rows_of, set_box
+from .witness_kernels import seek_witness
+
+NODES, PROGRAMS, TRIED, HEIGHT, CUT = 0, 1, 2, 3, 4
+"""Places of counts: nodes looked at, polytopes, searches for a witness; how many nodes are on the
+stack; whether one was left out for want of room."""
+COUNTS = 5
+GONE, LEAF, CUT_UP, BY_PIECES = 0, 1, 2, 3
+"""What becomes of a node: no pose is left; it is a leaf; it is to be cut across a turn, or by the
+convex pieces of a concave face."""
+ROUNDS = 3
+"""Times that a box is tightened before it is told whether its poses are far apart."""
+SHRINKS = 0.7
+"""A share of the longest side; if less is left, it is tightened again."""
+STUCK = 0.9
+"""The same, after cuts; if more is left, cutting the box does more."""
+HANDY = 0.9
+"""Turns (radians) above which linearising leaves out too much for programs to say anything."""
+FINE = 0.2
+"""Bounds that linearising may leave out of a box that counts as known."""
+FINEST = 0.02
+"""The same, of a box without a witness that is not cut further: it is left undecided."""
+NEARBY = 1e-6
+"""Radians, and radii: a box may be a point."""
+
+
+@borrowing
+def coarseness(top, stack, touches, work):
+    """What linearising leaves out about the middle of a tightened box, at most, in bounds."""
+    square = 0.0
+    for k in range(3):
+        square += (0.5 * (work.high[k] - work.low[k])) ** 2
+    worst = 0.0
+    for j in range(len(touches.arms)):
+        if stack.fixed[top, j] < 0:
+            continue
+        a = work.arms[j]
+        length = np.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
+        worst = max(worst, 0.5 * square * length / touches.reaches[j])
+        if touches.errors[j] < 0.5 * np.pi:
+            worst = max(worst, 0.5 * square / touches.errors[j])
+    return worst, np.sqrt(square)
+
+
+@borrowing
+def alike(top, angle, stack, aims):
+    """Whether all poses of a node's box are alike."""
+    shift = 0.0
+    for k in range(3):
+        shift += (stack.rooms[top, k, 1] - stack.rooms[top, k, 0]) ** 2
+    return angle < aims.turn and 0.5 * np.sqrt(shift) < aims.shift
+
+
+@borrowing
+def end_pose(z, shape, work):
+    """The pose, object to world, of a turn about the box's middle and a shift, (6,) together."""
+    cayley((0.5 * z[0], 0.5 * z[1], 0.5 * z[2]), work.turn)
+    q = work.other
+    for a in range(3):
+        for b in range(3):
+            q[a, b] = 0.0
+            for k in range(3):
+                q[a, b] += work.turn[a, k] * work.middle[k, b]
+    for a in range(3):
+        work.translation[a] = work.mean[a]
+        for b in range(3):
+            work.rotation[a, b] = q[b, a]
+            work.translation[a] -= shape.radius * q[b, a] * z[3 + b]
+
+
+@borrowing
+def coordinates(rotation, translation, radius, work, z):
+    """A pose, object to world, as a turn about the box's middle and a shift, (6,) in place.
+
+    Returns:
+        Whether it has them: not half a turn away.
+    """
+    for a in range(3):
+        z[3 + a] = 0.0
+        for b in range(3):
+            work.turn[a, b] = rotation[b, a]
+            z[3 + a] += rotation[b, a] * (work.mean[b] - translation[b]) / radius
+    known = gibbs_between(work.middle, work.turn, z)
+    for a in range(3):
+        z[a] *= 2.0
+    return known
+
+
+@borrowing
+def spreads(top, problem, stack, work):
+    """Whether a pose within the bounds is farther from the witness than alike.
+
+    It is sought from twice as far, along each axis along which the box is so wide.
+    """
+    shape, aims = problem.shape, problem.aims
+    z, least = work.objective, 1.0 + 2.0 * np.cos(aims.turn)
+    for k in range(6):
+        step = 2.0 * (aims.turn if k < 3 else aims.shift)
+        if work.high[k] - work.low[k] < step:
+            continue
+        for side in (-1.0, 1.0):
+            coordinates(work.best, work.shift, shape.radius, work, z)
+            z[k] += side * step
+            end_pose(z, shape, work)
+            met, _ = seek_witness(
+                stack.fixed[top],
+                stack.targets[top],
+                problem.contacts,
+                problem.model,
+                work.rotation,
+                work.translation,
+                work.seeking,
+            )
+            if not met:
+                continue
+            trace, square = 0.0, 0.0
+            for a in range(3):
+                moved = 0.0
+                for b in range(3):
+                    trace += work.best[a, b] * work.rotation[a, b]
+                    moved += work.rotation[b, a] * (work.mean[b] - work.translation[b])
+                    moved -= work.best[b, a] * (work.mean[b] - work.shift[b])
+                square += moved * moved
+            if trace < least or np.sqrt(square) > aims.shift * shape.radius:
+                return True
+    return False
+
+
+@borrowing
+def on_pieces(top, stack, shape):
+    """A contact on a concave face that its hull stands for; -1 if there is none."""
+    for j in range(stack.fixed.shape[1]):
+        f = stack.fixed[top, j]
+        if f >= 0 and stack.targets[top, j] == f and shape.first[f + 1] - shape.first[f] > 1:
+            return j
+    return -1
+
+
+@borrowing
+def emit(top, proven, at, stack, leaves, work):
+    """Write a leaf."""
+    for j in range(stack.fixed.shape[1]):
+        leaves.fixed[at, j] = stack.fixed[top, j]
+    for a in range(3):
+        for b in range(3):
+            leaves.charts[at, a, b] = stack.charts[top, a, b]
+            leaves.rotations[at, a, b] = work.rotation[a, b]
+        leaves.lows[at, a], leaves.highs[at, a] = stack.lows[top, a], stack.highs[top, a]
+        leaves.rooms[at, a, 0], leaves.rooms[at, a, 1] = (
+            stack.rooms[top, a, 0],
+            stack.rooms[top, a, 1],
+        )
+        leaves.translations[at, a] = work.translation[a]
+    leaves.proven[at] = proven
+
+
+@borrowing
+def seek_inside(top, near, problem, stack, counts, work):
+    """A witness from inside the polytope, which its box's middle need not be.
+
+    Args:
+        top: the node.
+        near: whether one far outside the box is another's witness. It isn't in a box so wide that
+            its poses are told as a family, whichever they are.
+        problem: see `cover.Problem`.
+        stack: see `cover.Stack`.
+        counts: see `NODES`.
+        work: see `cover.Work`.
+
+    Returns:
+        Whether one was found, and whether one was on the polygons that stand for the faces.
+    """
+    counts[TRIED] += 1
+    for k in range(6):
+        work.objective[k] = 0.5 * (work.low[k] + work.high[k])
+        if work.sum[6] > 0.0:
+            work.objective[k] = work.sum[k] / work.sum[6]
+    end_pose(work.objective, problem.shape, work)
+    met, on_polygons = seek_witness(
+        stack.fixed[top],
+        stack.targets[top],
+        problem.contacts,
+        problem.model,
+        work.rotation,
+        work.translation,
+        work.seeking,
+    )
+    met = met and (not near or is_near(problem.shape.radius, work))
+    if met:
+        copy_pose(work.rotation, work.translation, work.best, work.shift)
+    return met, on_polygons
+
+
+@borrowing
+def is_near(radius, work):
+    """Whether a pose is in a box, or no farther from it than that is wide."""
+    if not coordinates(work.rotation, work.translation, radius, work, work.objective):
+        return False
+    for k in range(6):
+        away = abs(work.objective[k] - 0.5 * (work.high[k] + work.low[k]))
+        if away > 1.5 * (work.high[k] - work.low[k]) + NEARBY:
+            return False
+    return True
+
+
+@borrowing
+def settle_leaf(top, at, problem, stack, leaves, counts, work):
+    """What becomes of a node whose contacts are all assigned.
+
+    Args:
+        top: the node.
+        at: where a leaf is written.
+        problem: see `cover.Problem`.
+        stack: see `cover.Stack`.
+        leaves: see `cover.Leaves`.
+        counts: see `PROGRAMS`.
+        work: see `cover.Work`.
+
+    Returns:
+        `GONE`, `LEAF`, `CUT_UP` or `BY_PIECES`.
+    """
+    shape, touches, aims = problem.shape, problem.touches, problem.aims
+    work.cut_count[0] = 0
+    on_polygons, met, tries, coarse = False, False, 0, np.inf
+    for turn in range(2 * ROUNDS):
+        view(top, stack, touches, work)
+        set_box(top, stack, work)
+        used = cut_rows(touches, rows_of(top, stack, shape, touches, work), work)
+        counts[PROGRAMS] += 1
+        share = tighten(0, 6, used, work)
+        if share < 0.0:
+            return GONE
+        keep_box(top, stack, work)
+        coarse, angle = coarseness(top, stack, touches, work)
+        handy = angle < HANDY or coarse < 1.0
+        if not met:
+            met, on_polygons = seek_inside(top, handy, problem, stack, counts, work)
+        if met:
+            if coarse > FINE and not alike(top, angle, stack, aims):
+                if handy and share < SHRINKS and turn < ROUNDS:
+                    continue
+                if not spreads(top, problem, stack, work):
+                    return CUT_UP
+            copy_pose(work.best, work.shift, work.rotation, work.translation)
+            emit(top, True, at, stack, leaves, work)
+            return LEAF
+        if not handy:
+            return CUT_UP
+        if on_polygons and on_pieces(top, stack, shape) >= 0:
+            return BY_PIECES
+        tries += 1
+        if tries > 1 and coarse > FINEST and share > STUCK:
+            break
+        note_cuts(top, problem, stack, work)
+    if coarse >= FINEST:
+        return CUT_UP
+    if on_pieces(top, stack, shape) >= 0:
+        return BY_PIECES
+    emit(top, False, at, stack, leaves, work)
+    return LEAF

@@ -1,0 +1,146 @@
+"""Compiled rows: what a touch asks of the poses in a box, as linear inequalities.
+
+A pose is ``Q``, world to object, and a shift ``s``, so that a point ``p`` (about the contacts'
+mean) is at ``Q p + s`` in the object's frame. A box is a middle rotation, and about it the turns
+``Cay(w / 2)`` with ``|w_k| <= half_k`` (Cayley's map: twice the Gibbs vector is about a rotation
+vector), and shifts within limits. Whatever is asked is of the form ``m . (Q a + s) <= limit``; with
+``a`` turned by the middle rotation it is ``m . a + w . (a x m) + r + m . s <= limit``, where ``r``
+is what linearising leaves out, and the row gives up the least that ``r`` can be in the box.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..compiling import borrowing
+
+ROUNDING = 1e-10
+"""Room for rounding, in radii or radians: a hundred thousand times what a sum of six products of
+numbers about one loses."""
+
+
+@borrowing
+def remainder(a, m, half):
+    """The least and the most that linearising leaves out of ``m . Cay(w / 2) a`` in a box.
+
+    ``Cay(w / 2) a = a + c (w x a + w x (w x a) / 2)`` with ``c = 1 / (1 + |w|^2 / 4)``; what is
+    quadratic is ``sum_k w_k^2 (a_k m_k - a . m) + sum_{i < k} w_i w_k (a_i m_k + a_k m_i)``.
+
+    Args:
+        a: (3,) turned by the middle rotation.
+        m: (3,) direction.
+        half: (3,) half sides of the box.
+    """
+    h0, h1, h2 = half[0], half[1], half[2]
+    p0, p1, p2 = a[0] * m[0], a[1] * m[1], a[2] * m[2]
+    along = p0 + p1 + p2
+    d0, d1, d2 = (p0 - along) * h0 * h0, (p1 - along) * h1 * h1, (p2 - along) * h2 * h2
+    off = abs(a[0] * m[1] + a[1] * m[0]) * h0 * h1
+    off += abs(a[0] * m[2] + a[2] * m[0]) * h0 * h2 + abs(a[1] * m[2] + a[2] * m[1]) * h1 * h2
+    linear = abs(a[1] * m[2] - a[2] * m[1]) * h0 + abs(a[2] * m[0] - a[0] * m[2]) * h1
+    linear += abs(a[0] * m[1] - a[1] * m[0]) * h2
+    square = 0.25 * (h0 * h0 + h1 * h1 + h2 * h2)
+    linear *= square / (1.0 + square)
+    least = min(d0, 0.0) + min(d1, 0.0) + min(d2, 0.0) - off
+    most = max(d0, 0.0) + max(d1, 0.0) + max(d2, 0.0) + off
+    return 0.5 * least - linear, 0.5 * most + linear
+
+
+@borrowing
+def extent(a, m, half, angle):
+    """The least and the most of ``m . Q a`` over the rotations of a box.
+
+    Args:
+        a: (3,) turned by the middle rotation.
+        m: (3,) unit direction.
+        half: (3,) half sides of the box.
+        angle: the largest of its turns, radians.
+    """
+    along = a[0] * m[0] + a[1] * m[1] + a[2] * m[2]
+    if angle < 1.0:
+        linear = abs(a[1] * m[2] - a[2] * m[1]) * half[0] + abs(a[2] * m[0] - a[0] * m[2]) * half[1]
+        linear += abs(a[0] * m[1] - a[1] * m[0]) * half[2]
+        least, most = remainder(a, m, half)
+        return along - linear + least, along + linear + most
+    length = np.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
+    if angle >= np.pi:
+        return -length, length
+    cosine = np.cos(angle)
+    across = np.sin(angle) * np.sqrt(max(length * length - along * along, 0.0))
+    least = -length if along <= -cosine * length else along * cosine - across
+    most = length if along >= cosine * length else along * cosine + across
+    return least, most
+
+
+@borrowing
+def add_row(a, m, moves, limit, half, low, high, columns, used):
+    """Ask that ``m . (Q a + s)``, without ``s`` if nothing moves, is at most ``limit``.
+
+    Left out if the box implies it.
+
+    Returns:
+        How many rows there are then.
+    """
+    c0, c1, c2 = a[1] * m[2] - a[2] * m[1], a[2] * m[0] - a[0] * m[2], a[0] * m[1] - a[1] * m[0]
+    along = a[0] * m[0] + a[1] * m[1] + a[2] * m[2]
+    most = max(c0 * low[0], c0 * high[0]) + max(c1 * low[1], c1 * high[1])
+    most += max(c2 * low[2], c2 * high[2])
+    if moves:
+        for k in range(3):
+            most += max(m[k] * low[3 + k], m[k] * high[3 + k])
+    room = limit - along + ROUNDING
+    if most <= room or used == columns.shape[1]:
+        return used
+    least, _ = remainder(a, m, half)
+    room -= least
+    if most <= room:
+        return used
+    columns[0, used], columns[1, used], columns[2, used] = c0, c1, c2
+    for k in range(3):
+        columns[3 + k, used] = m[k] if moves else 0.0
+    columns[6, used] = room
+    return used + 1
+
+
+@borrowing
+def contact_rows(
+    arm, normal, reach, error, feature, polygon, shape, half, low, high, columns, used
+):
+    """What one contact on a feature asks of the poses in a box.
+
+    Its place is within its bound of the polygon, so of each half-space that holds the polygon. Its
+    normal is within its bound of the feature's cone: of a face's normal, and so are its parts
+    across it; of an edge's or a vertex's cone, which is within its half angle of its middle.
+
+    Args:
+        arm: (3,) its place about the contacts' mean, turned by the box's middle rotation.
+        normal: (3,) measured, likewise.
+        reach: bound on the place.
+        error: bound on the normal, radians.
+        feature: what it is on.
+        polygon: the polygon that stands for it.
+        shape: see `shape.Shape`.
+        half: (3,) half sides of the box's turns.
+        low: (6,) the box: turns, then shifts.
+        high: (6,) likewise.
+        columns: (7, m) of each row its six numbers and its limit, written in place.
+        used: how many there are.
+
+    Returns:
+        How many there are then; what finds no room is left out.
+    """
+    for side in range(shape.side_start[polygon], shape.side_start[polygon + 1]):
+        used = add_row(
+            arm, shape.sides[side], True, shape.limits[side] + reach, half, low, high, columns, used
+        )
+    wide = error + shape.half_angles[feature]
+    if wide < np.pi:
+        m = shape.normals[feature]
+        # The other way round, so that all rows are bounds from above.
+        back = (-m[0], -m[1], -m[2])
+        used = add_row(normal, back, False, -np.cos(wide), half, low, high, columns, used)
+    if error < 0.5 * np.pi:
+        sine = np.sin(error)
+        for k in range(shape.cone_start[feature], shape.cone_start[feature + 1]):
+            used = add_row(normal, shape.cone_sides[k], False, sine, half, low, high, columns, used)
+    return used

@@ -1,1 +1,0 @@
-"""Tree and model test as one search over a solid."""

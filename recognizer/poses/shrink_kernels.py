@@ -1,0 +1,135 @@
+"""Compiled shrinking of a node's box, by linear programs over the rows of what is assigned.
+
+Beside the rows of contacts there are cuts: where a search for a witness ended, the gaps that are
+left give rows that say more there.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..compiling import borrowing
+from .polytope_kernels import tighten
+from .rows_kernels import add_row, contact_rows
+
+NEAR = 0.5
+"""Gaps of less, in bounds, give no cut."""
+
+
+@borrowing
+def set_box(top, stack, work):
+    """The box of a node's poses as linear programs have it: turns about its middle, then shifts."""
+    for k in range(3):
+        work.low[k], work.high[k] = -work.half[k], work.half[k]
+        work.low[3 + k], work.high[3 + k] = stack.rooms[top, k, 0], stack.rooms[top, k, 1]
+
+
+@borrowing
+def rows_of(top, stack, shape, touches, work):
+    """The rows of all contacts that are assigned, in the box; returns how many."""
+    used = 0
+    for j in range(len(touches.arms)):
+        f = stack.fixed[top, j]
+        if f >= 0:
+            used = contact_rows(
+                work.arms[j],
+                work.facings[j],
+                touches.reaches[j],
+                touches.errors[j],
+                f,
+                stack.targets[top, j],
+                shape,
+                work.half,
+                work.low,
+                work.high,
+                work.columns,
+                used,
+            )
+    return used
+
+
+@borrowing
+def cut_rows(touches, used, work):
+    """The rows of cuts, behind ``used`` others; returns how many there are then."""
+    for c in range(work.cut_count[0]):
+        i = work.cut_of[c]
+        used = add_row(
+            work.arms[i],
+            work.cuts[c],
+            True,
+            work.cuts[c, 3] + touches.reaches[i],
+            work.half,
+            work.low,
+            work.high,
+            work.columns,
+            used,
+        )
+    return used
+
+
+@borrowing
+def note_cuts(top, problem, stack, work):
+    """Cuts from where a search for a witness ended.
+
+    A contact is within its bound of a polygon, so of the polygon's support in any direction; in
+    that of its gap this says most.
+    """
+    radius, reaches = problem.shape.radius, problem.touches.reaches
+    gaps, lengths = work.seeking[0][0], work.seeking[0][1]
+    start, corners = problem.model[3], problem.model[4]
+    for i in range(len(reaches)):
+        at, polygon = work.cut_count[0], stack.targets[top, i]
+        if stack.fixed[top, i] < 0 or lengths[i] < NEAR * reaches[i] * radius:
+            continue
+        if at == len(work.cut_of):
+            return
+        cut = work.cuts[at]
+        for k in range(3):
+            cut[k] = gaps[i, k] / lengths[i]
+        most = -np.inf
+        for c in range(start[polygon], start[polygon + 1]):
+            along = cut[0] * corners[c, 0] + cut[1] * corners[c, 1] + cut[2] * corners[c, 2]
+            most = max(most, along)
+        cut[3] = most / radius
+        work.cut_of[at] = i
+        work.cut_count[0] += 1
+
+
+@borrowing
+def keep_box(top, stack, work):
+    """Write a box that was tightened back to its node, about the middle it is about.
+
+    About another middle a box is larger than it was: turns are kept only where they are fewer.
+    """
+    before, after, square = 1.0, 1.0, 1.0
+    for k in range(3):
+        before *= stack.highs[top, k] - stack.lows[top, k]
+        after *= 0.5 * (work.high[k] - work.low[k])
+        square += (0.5 * (stack.highs[top, k] + stack.lows[top, k])) ** 2
+    # A volume of Gibbs vectors counts by this as one of rotations.
+    fewer = after < before / (square * square)
+    for a in range(3):
+        if fewer:
+            stack.boxed[top] = True
+            for b in range(3):
+                stack.charts[top, a, b] = work.middle[a, b]
+            stack.lows[top, a], stack.highs[top, a] = 0.5 * work.low[a], 0.5 * work.high[a]
+        stack.rooms[top, a, 0] = max(stack.rooms[top, a, 0], work.low[3 + a])
+        stack.rooms[top, a, 1] = min(stack.rooms[top, a, 1], work.high[3 + a])
+
+
+@borrowing
+def tighten_turns(top, stack, shape, touches, work):
+    """Shrink the turns of a node that was viewed, by what is assigned.
+
+    Returns:
+        What is left of its longest side, at most, as a share; below zero if no pose is left.
+    """
+    set_box(top, stack, work)
+    used = rows_of(top, stack, shape, touches, work)
+    if used == 0:
+        return 1.0
+    share = tighten(0, 3, used, work)
+    if share >= 0.0:
+        keep_box(top, stack, work)
+    return share

@@ -1,0 +1,215 @@
+"""The poses of one solid that contacts allow: a cover, as interpretations with poses."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..contacts.contacts import Contacts
+from ..models.polyhedron import Polyhedron
+from ..tree.limits import SearchLimits
+from ..tree.tree import Constraints
+from .component_kernels import link_leaves, report_components
+from .cover import Aims, problem_of, search_cover
+from .fits.pose import Poses
+from .solid import Bits, SolidEntry, bit_set
+from .surroundings.surroundings import Surroundings, clear
+
+EXACT_SYMMETRY = 1e-7
+"""How far a symmetry may miss, as a share of the smallest bound on a position, to stand for a part
+of the search: what it misses is then below what a witness may miss a bound by."""
+COARSE, COARSEST = 5.0, 0.1
+"""How far turns about a box's axis may move contacts when their features are tried: in bounds on
+positions, and at least so many radii. Features of wider boxes are mostly left by what rules out
+nothing."""
+ROUNDING = 1e-12
+"""Of a cosine."""
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Aim:
+    """What a search is to find out, and how far it goes."""
+
+    constraints: Constraints
+    """Which constraints on pairs prune the tree."""
+    limits: SearchLimits
+    turn: float
+    """Poses whose rotations are no farther apart than this, radians, ..."""
+    shift: float
+    """... and whose shifts no farther than this, metres, count as the same."""
+    outliers: int = 0
+    """How many contacts may lie on no feature."""
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """What a search found, and how."""
+
+    poses: Poses
+    """One for each component of the poses that an interpretation has."""
+    nodes: int
+    """Nodes of the tree, boxes with features that are left to contacts, that were looked at."""
+    tried: int
+    """Searches for a pose that meets every bound."""
+    complete: bool
+    """False if a limit ended it."""
+
+
+def find_poses(
+    entry: SolidEntry,
+    contacts: Contacts,
+    aim: Aim,
+    surroundings: Surroundings,
+    known: NDArray[np.int32] | None = None,
+) -> Found:
+    """Every interpretation of contacts with one solid that isn't ruled out, with poses.
+
+    Args:
+        entry: the solid.
+        contacts: at least one contact, in the order of the search.
+        aim: what to find out.
+        surroundings: what else is known.
+        known: (m, k) all interpretations of the first k contacts, if they are known.
+    """
+    if surroundings.support is not None and surroundings.support.resting:
+        return _find_standing(entry, contacts, aim, surroundings, known)
+    domains = _domains(entry, contacts, known)
+    permutations, missed = entry.permutations
+    symmetric = (
+        known is None
+        and len(permutations) > 1
+        and missed < EXACT_SYMMETRY * float(contacts.position_error.min())
+        and aim.outliers == 0
+    )
+    if symmetric:
+        domains[0] &= entry.orbits
+    found = _find(entry, contacts, aim, domains)
+    poses = found.poses
+    if not surroundings.says_nothing(contacts):
+        poses = clear(entry.model, entry.features, poses, contacts, surroundings)
+    if symmetric:
+        poses = _spread_over_symmetries(entry.model, poses, permutations)
+    return replace(found, poses=poses)
+
+
+def _domains(entry: SolidEntry, contacts: Contacts, known: NDArray[np.int32] | None) -> Bits:
+    """(n, w) the features that each contact may be on."""
+    domains = entry.by_kind[contacts.kinds]
+    if known is not None:
+        for i, column in enumerate(known.T):
+            domains[i] &= bit_set(np.unique(column[column >= 0]), len(entry.features))
+    return domains
+
+
+def _find(entry: SolidEntry, contacts: Contacts, aim: Aim, domains: Bits) -> Found:
+    """The same where nothing else is known, with the features that each contact may be on."""
+    shape, model = entry.shape, entry.test.model
+    largest = float(contacts.position_error.max()) / shape.radius
+    aims = Aims(
+        spare=aim.outliers,
+        crowd=float(aim.limits.crowd),
+        coarse=max(COARSE * largest, COARSEST),
+        vague=_vague(contacts),
+        turn=aim.turn,
+        shift=aim.shift / shape.radius,
+    )
+    problem = problem_of(shape, model, entry.packed, contacts, aim.constraints.bits, aims)
+    cover = search_cover(
+        problem, domains, most_nodes=aim.limits.nodes, most_found=aim.limits.budget
+    )
+    leaves = cover.leaves
+    _, interpretations = np.unique(leaves.fixed, axis=0, return_inverse=True)
+    labels, count = link_leaves(leaves, interpretations.reshape(-1))
+    poses = report_components(
+        *(leaves, labels, count, problem.contacts, model, problem.touches.mean, shape.radius)
+    )
+    return Found(Poses(*poses), cover.nodes, cover.tried, cover.complete)
+
+
+def _find_standing(
+    entry: SolidEntry,
+    contacts: Contacts,
+    aim: Aim,
+    surroundings: Surroundings,
+    known: NDArray[np.int32] | None,
+) -> Found:
+    """The search of a solid that stands on a face of its hull: each such face in its turn.
+
+    The support is one more contact, on that face.
+    """
+    support = surroundings.support
+    assert support is not None
+    standing = entry.standing
+    count, size = len(entry.features), len(standing.features)
+    own = _domains(entry, contacts, known)
+    domains = np.zeros((len(contacts) + 1, -(-size // 64)), np.uint64)
+    domains[1:, : own.shape[1]] = own
+    parts: list[Found] = []
+    plain: Found | None = None
+    for index, face in enumerate(entry.stable_faces):
+        touch = support.touch(face, entry.model.diameter, contacts, aim.outliers)
+        if touch is None:
+            # Bounds so wide that the face's plane, as a contact, says nothing: only the pose does.
+            plain = plain or _find(entry, contacts, aim, own)
+            poses = clear(entry.model, entry.features, plain.poses, contacts, surroundings, face)
+            parts.append(replace(plain, poses=poses))
+            continue
+        everything = Contacts.join([touch, contacts])
+        domains[0] = bit_set(np.array([count + index]), size)
+        found = _find(standing, everything, aim, domains)
+        poses = found.poses.take(found.poses.faces[:, 0] >= 0)
+        poses = clear(entry.model, standing.features, poses, everything, surroundings, face)
+        poses = replace(poses, faces=np.ascontiguousarray(poses.faces[:, 1:]))
+        parts.append(replace(found, poses=poses))
+    return Found(
+        Poses.join([part.poses for part in parts]),
+        sum(part.nodes for part in parts),
+        sum(part.tried for part in parts),
+        all(part.complete for part in parts),
+    )
+
+
+def _vague(contacts: Contacts) -> bool:
+    """Whether the known normals leave the rotation open: fewer than two, or maybe all parallel."""
+    rows = zip(contacts.normals, contacts.normal_error.tolist(), strict=True)
+    known = ((normal, error) for normal, error in rows if error < math.pi / 2.0)
+    first, first_error = next(known, (None, 0.0))
+    # If none surely leans away from the first, two others are about as parallel. Contacts come in
+    # an order that has those that lean most first, so mostly the second says it.
+    return first is None or all(
+        abs(first @ normal) >= math.cos(min(first_error + error, math.pi / 2.0)) - ROUNDING
+        for normal, error in known
+    )
+
+
+def _spread_over_symmetries(
+    model: Polyhedron, poses: Poses, permutations: NDArray[np.int32]
+) -> Poses:
+    """Each interpretation as seen from every symmetry of the solid, with its pose."""
+    if not len(poses):
+        return poses
+    count, found = len(permutations), len(poses)
+    faces = permutations[:, poses.faces].reshape(count * found, -1)
+    faces, rows = np.unique(faces, axis=0, return_index=True)
+    which, of = np.divmod(rows, found)
+    turns = model.symmetries[which]
+    rotations = poses.rotations[of] @ turns.transpose(0, 2, 1)
+    centres = poses.translations[of] + poses.rotations[of] @ model.centroid
+    # A motion in the object's frame turns along.
+    frames = np.zeros((len(of), 6, 6))
+    frames[:, :3, :3] = frames[:, 3:, 3:] = turns
+    informations = frames @ poses.informations[of] @ frames.transpose(0, 2, 1)
+    return Poses(
+        np.ascontiguousarray(faces, np.int32),
+        rotations,
+        centres - rotations @ model.centroid,
+        poses.costs[of],
+        informations,
+        poses.proven[of],
+        poses.reaches[of],
+    )
