@@ -44,7 +44,7 @@ class PoseTolerance:
         return max(self.translation * diameter, self.position_errors * position_error)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Hypothesis:
     """An object at a pose, as some interpretations of the contacts have it."""
 
@@ -91,6 +91,14 @@ class Hypothesis:
         hypothesis.__dict__["weight"] = weight
         hypothesis.__dict__["interpretations"] = self.interpretations[:, order]
         return hypothesis
+
+    def __repr__(self) -> str:
+        x, y, z = self.T_world_object[:3, 3]
+        state = "fixed" if self.determined else "open"
+        return (
+            f"<Hypothesis: {self.object_name} at ({x:.4g}, {y:.4g}, {z:.4g}) m, {state},"
+            f" weight {self.weight:.3g}, {len(self.interpretations)} interpretations>"
+        )
 
     @property
     def determined(self) -> bool:

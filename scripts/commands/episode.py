@@ -208,7 +208,7 @@ def _play(
                 f" {np.degrees(moved.turn):.2f}°; {len(env.contacts)} contacts still hold",
                 style="dim",
             )
-        if before and env.belief and before is not env.belief:
+        if before is not None and env.belief is not None and before is not env.belief:
             ruled_out = _ruled_out(one, before, env.belief) + ruled_out
         before = env.belief
     return EpisodeRecord(states[0], tuple(states[1:]), verdict_in_short(states[-1])), ruled_out
