@@ -27,6 +27,26 @@ def cayley(g, rotation):
 
 
 @borrowing
+def turn_chart(g, chart, turn, rotation):
+    """The rotation (3, 3) that a Gibbs vector from a chart leads to, in place; ``turn`` is work."""
+    cayley(g, turn)
+    for a in range(3):
+        for b in range(3):
+            rotation[a, b] = turn[a, 0] * chart[0, b] + turn[a, 1] * chart[1, b]
+            rotation[a, b] += turn[a, 2] * chart[2, b]
+
+
+@borrowing
+def shift_of(rotation, translation, mean, radius, inverse, shift):
+    """A pose, object to world, as its inverse rotation and the contacts' mean in its frame."""
+    for a in range(3):
+        shift[a] = 0.0
+        for b in range(3):
+            inverse[a, b] = rotation[b, a]
+            shift[a] += rotation[b, a] * (mean[b] - translation[b]) / radius
+
+
+@borrowing
 def gibbs_between(first, second, g):
     """The Gibbs vector of the turn from one rotation (3, 3) to another; False if it has none."""
     trace = 0.0
@@ -64,11 +84,7 @@ def recentre(chart, low, high, turn, half, middle):
         The largest of these turns, radians.
     """
     c0, c1, c2 = 0.5 * (low[0] + high[0]), 0.5 * (low[1] + high[1]), 0.5 * (low[2] + high[2])
-    cayley((c0, c1, c2), turn)
-    for a in range(3):
-        for b in range(3):
-            middle[a, b] = turn[a, 0] * chart[0, b] + turn[a, 1] * chart[1, b]
-            middle[a, b] += turn[a, 2] * chart[2, b]
+    turn_chart((c0, c1, c2), chart, turn, middle)
     half[0] = half[1] = half[2] = 0.0
     longest = 0.0
     for corner in range(8):

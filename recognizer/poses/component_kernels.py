@@ -9,13 +9,37 @@ from __future__ import annotations
 import numpy as np
 
 from ..compiling import borrowing, kernel
-from .boxes_kernels import cayley, gibbs_between, recentre
+from .boxes_kernels import gibbs_between, recentre, shift_of, turn_chart
 from .fits.pose_kernels import finish, weigh
 from .motions.motion_kernels import copy_pose
 from .proofs.proof_kernels import workspace
 
+ROUNDING = 1e-6
+"""Of angles between rotations that are about the same, or about half a turn apart."""
+ALL_ROUND = 2.6
+"""An angle (radians) up to which a box's turns from a rotation are surely less than half a turn,
+with room for where `gibbs_between` gives up."""
 TOUCHING = 1e-9
 """Boxes as near as this overlap: rounding."""
+
+
+@borrowing
+def angle_between(first, second):
+    """The angle between two rotations (3, 3), radians."""
+    trace = 0.0
+    for a in range(3):
+        for b in range(3):
+            trace += first[a, b] * second[a, b]
+    return np.arccos(min(max(0.5 * (trace - 1.0), -1.0), 1.0))
+
+
+@borrowing
+def view_leaves(leaves, middles, halves, angles, turn):
+    """The middle of each leaf's box, half its sides and the largest turn in it, in place."""
+    for m in range(len(angles)):
+        angles[m] = recentre(
+            leaves.charts[m], leaves.lows[m], leaves.highs[m], turn, halves[m], middles[m]
+        )
 
 
 @borrowing
@@ -23,12 +47,7 @@ def corner_of(leaves, at, corner, turn, rotation, g):
     """The rotation (3, 3), world to object, at a corner of a leaf's box, in place."""
     for k in range(3):
         g[k] = leaves.highs[at, k] if corner >> k & 1 else leaves.lows[at, k]
-    cayley(g, turn)
-    for a in range(3):
-        for b in range(3):
-            rotation[a, b] = 0.0
-            for k in range(3):
-                rotation[a, b] += turn[a, k] * leaves.charts[at, k, b]
+    turn_chart(g, leaves.charts[at], turn, rotation)
 
 
 @borrowing
@@ -39,19 +58,16 @@ def overlap(one, other, leaves, middles, halves, angles, space):
         low = max(leaves.rooms[one, k, 0], leaves.rooms[other, k, 0])
         if low > min(leaves.rooms[one, k, 1], leaves.rooms[other, k, 1]) + TOUCHING:
             return False
-    trace = 0.0
-    for a in range(3):
-        for b in range(3):
-            trace += middles[one, a, b] * middles[other, a, b]
-    reach = angles[one] + angles[other] + TOUCHING
-    if reach < np.pi and trace < 1.0 + 2.0 * np.cos(reach):
+    between = angle_between(middles[one], middles[other])
+    if between > angles[one] + angles[other] + ROUNDING:
         return False
+    if between + angles[other] > ALL_ROUND:
+        return True
     for k in range(3):
         least, most = np.inf, -np.inf
         for corner in range(8):
             corner_of(leaves, other, corner, turn, rotation, g)
-            if not gibbs_between(middles[one], rotation, g):
-                return True
+            gibbs_between(middles[one], rotation, g)
             least, most = min(least, g[k]), max(most, g[k])
         if 2.0 * least > halves[one, k] + TOUCHING or 2.0 * most < -halves[one, k] - TOUCHING:
             return False
@@ -73,10 +89,7 @@ def link_leaves(leaves, interpretations):
     labels = np.full(count, -1, np.int64)
     middles, halves, angles = np.empty((count, 3, 3)), np.empty((count, 3)), np.empty(count)
     space = (np.empty((3, 3)), np.empty((3, 3)), np.empty(3))
-    for m in range(count):
-        angles[m] = recentre(
-            leaves.charts[m], leaves.lows[m], leaves.highs[m], space[0], halves[m], middles[m]
-        )
+    view_leaves(leaves, middles, halves, angles, space[0])
     found = 0
     waiting = np.empty(count, np.int64)
     for seed in range(count):
@@ -115,17 +128,7 @@ def within(at, leaves, rotation, shift, g):
 
 
 @borrowing
-def shift_of(rotation, translation, mean, radius, inverse, shift):
-    """A pose, object to world, as its inverse rotation and the contacts' mean in its frame."""
-    for a in range(3):
-        shift[a] = 0.0
-        for b in range(3):
-            inverse[a, b] = rotation[b, a]
-            shift[a] += rotation[b, a] * (mean[b] - translation[b]) / radius
-
-
-@borrowing
-def reach_of(at, leaves, inverse, shift, middle, space):
+def reach_of(at, leaves, seen, inverse, shift, middle, space):
     """How far the poses of a leaf's box are from a pose, at most.
 
     With the shift read in the object's frame, a point that is ``v`` from the contacts' mean moves
@@ -135,21 +138,23 @@ def reach_of(at, leaves, inverse, shift, middle, space):
         The turn, radians, and how far the object's centroid moves, in radii.
     """
     turn, rotation, g = space
-    far = 0.0
-    for corner in range(8):
-        # Seen from the pose the box is the hull of its corners' images.
+    middles, angles = seen
+    far, square, arm = 0.0, 0.0, 0.0
+    # Seen from the pose the box is the hull of its corners' images, unless some turn in it is half
+    # a turn away.
+    whole = angle_between(middles[at], inverse) + angles[at] > ALL_ROUND
+    for corner in range(0 if whole else 8):
         corner_of(leaves, at, corner, turn, rotation, g)
-        if not gibbs_between(inverse, rotation, g):
-            return np.pi, 2.0 + far
+        gibbs_between(inverse, rotation, g)
         far = max(far, g[0] ** 2 + g[1] ** 2 + g[2] ** 2)
-    square, arm = 0.0, 0.0
     for k in range(3):
         apart = max(leaves.rooms[at, k, 1] - shift[k], shift[k] - leaves.rooms[at, k, 0])
         square += apart * apart
         arm += (shift[k] - middle[k]) ** 2
     # The chord of a turn with tangent t of its half is 2 t / sqrt(1 + t^2).
-    chord = 2.0 * np.sqrt(far / (1.0 + far))
-    return 2.0 * np.arctan(np.sqrt(far)), np.sqrt(square) + chord * np.sqrt(arm)
+    chord = 2.0 if whole else 2.0 * np.sqrt(far / (1.0 + far))
+    angle = np.pi if whole else 2.0 * np.arctan(np.sqrt(far))
+    return angle, np.sqrt(square) + chord * np.sqrt(arm)
 
 
 @kernel
@@ -206,13 +211,13 @@ def report_components(leaves, labels, found, contacts, model, mean, radius):
         costs[k] = weigh(
             n, features, contacts, model, rotations[k], translations[k], work, informations[k]
         )
-    centre = np.empty(3)
-    for a in range(3):
-        centre[a] = model[5][a] / radius
+    count, centre = len(labels), model[5] / radius
+    seen = (np.empty((count, 3, 3)), np.empty(count))
+    view_leaves(leaves, seen[0], np.empty((count, 3)), seen[1], space[0])
     for m in range(len(labels)):
         k = labels[m]
         shift_of(rotations[k], translations[k], mean, radius, inverse, shift)
-        turn, way = reach_of(m, leaves, inverse, shift, centre, space)
+        turn, way = reach_of(m, leaves, seen, inverse, shift, centre, space)
         reaches[k, 0] = max(reaches[k, 0], turn)
         reaches[k, 1] = max(reaches[k, 1], way * radius)
     return faces, rotations, translations, costs, informations, proven, reaches

@@ -182,6 +182,8 @@ class Cover:
     """What a search found."""
 
     leaves: Leaves
+    interpretations: Ints
+    """(m,) the interpretation of each leaf, numbered as they were found."""
     nodes: int
     """How many nodes were looked at."""
     tried: int
@@ -211,17 +213,19 @@ def search_cover(
     counts = np.zeros(COUNTS, np.int64)
     counts[HEIGHT] = 1
     buffer, parts = _leaves(n, MOST_LEAVES), []
-    known: set[bytes] = set()
+    known: dict[bytes, int] = {}
+    interpretations: list[int] = []
     while counts[HEIGHT] > 0 and counts[NODES] < most_nodes and len(known) < most_found:
         steps = min(STEPS, most_nodes - int(counts[NODES]))
         # Each may be of another interpretation.
         room = Leaves._make(array[: most_found - len(known)] for array in buffer)
         found = advance(problem, stack, room, counts, work, steps)
         parts.append(Leaves._make(array[:found].copy() for array in buffer))
-        known.update(row.tobytes() for row in parts[-1].fixed)
+        interpretations += [known.setdefault(r.tobytes(), len(known)) for r in parts[-1].fixed]
     parts = parts or [Leaves._make(array[:0] for array in buffer)]
     return Cover(
         join(parts),
+        np.array(interpretations, np.int64),
         int(counts[NODES]),
         int(counts[TRIED]),
         counts[HEIGHT] == 0 and not counts[CUT],

@@ -22,7 +22,6 @@ from .leaf_kernels import (
     HEIGHT,
     LEAF,
     NODES,
-    PROGRAMS,
     on_pieces,
     settle_leaf,
 )
@@ -145,7 +144,7 @@ def chart(top, stack):
 
 
 @borrowing
-def narrow_node(top, problem, stack, counts, work):
+def narrow_node(top, problem, stack, work):
     """Drop what a node's box doesn't allow, and shrink the box by what is assigned.
 
     Returns:
@@ -167,7 +166,6 @@ def narrow_node(top, problem, stack, counts, work):
             return ASSIGNED
         if assigned < FEWEST or angle > HANDY or ways <= aims.crowd:
             break
-        counts[PROGRAMS] += 1
         share = tighten_turns(top, stack, shape, touches, work)
         if share < 0.0:
             return GONE
@@ -212,7 +210,7 @@ def step(top, found, problem, stack, leaves, counts, work):
         if outcome == ASSIGNED:
             chart(top, stack)
             return CHARTS, False
-    outcome = narrow_node(top, problem, stack, counts, work)
+    outcome = narrow_node(top, problem, stack, work)
     if outcome == GONE:
         return 0, False
     if outcome == ASSIGNED:

@@ -10,10 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..compiling import borrowing
-from .motions.align_kernels import diagonalise
-
-ROUNDING = 1e-6
-"""Misfit of normals, in squared bounds, that is put down to rounding."""
+from .motions.align_kernels import ROUNDING, diagonalise, rotation_of
 
 
 @borrowing
@@ -81,15 +78,7 @@ def first_box(fixed, shape, touches, form, vectors, chart, half):
                 return np.pi
             longest = max(longest, slack / gap)
     w, x, y, z = vectors[0, best], vectors[1, best], vectors[2, best], vectors[3, best]
-    chart[0, 0] = w * w + x * x - y * y - z * z
-    chart[0, 1] = 2.0 * (x * y - w * z)
-    chart[0, 2] = 2.0 * (x * z + w * y)
-    chart[1, 0] = 2.0 * (x * y + w * z)
-    chart[1, 1] = w * w - x * x + y * y - z * z
-    chart[1, 2] = 2.0 * (y * z - w * x)
-    chart[2, 0] = 2.0 * (x * z - w * y)
-    chart[2, 1] = 2.0 * (y * z + w * x)
-    chart[2, 2] = w * w - x * x - y * y + z * z
+    rotation_of(w, x, y, z, chart)
     for k in range(3):
         half[k] = 0.0
     for k in range(4):

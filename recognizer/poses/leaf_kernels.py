@@ -12,17 +12,17 @@ from __future__ import annotations
 import numpy as np
 
 from ..compiling import borrowing
-from .boxes_kernels import cayley, gibbs_between
+from .boxes_kernels import gibbs_between, shift_of, turn_chart
 from .motions.motion_kernels import copy_pose
 from .node_kernels import view
 from .polytope_kernels import tighten
 from .shrink_kernels import cut_rows, keep_box, note_cuts, rows_of, set_box
 from .witness_kernels import seek_witness
 
-NODES, PROGRAMS, TRIED, HEIGHT, CUT = 0, 1, 2, 3, 4
-"""Places of counts: nodes looked at, polytopes, searches for a witness; how many nodes are on the
-stack; whether one was left out for want of room."""
-COUNTS = 5
+NODES, TRIED, HEIGHT, CUT = 0, 1, 2, 3
+"""Places of counts: nodes looked at; searches for a witness; how many nodes are on the stack;
+whether one was left out for want of room."""
+COUNTS = 4
 GONE, LEAF, CUT_UP, BY_PIECES = 0, 1, 2, 3
 """What becomes of a node: no pose is left; it is a leaf; it is to be cut across a turn, or by the
 convex pieces of a concave face."""
@@ -72,18 +72,32 @@ def alike(top, angle, stack, aims):
 @borrowing
 def end_pose(z, shape, work):
     """The pose, object to world, of a turn about the box's middle and a shift, (6,) together."""
-    cayley((0.5 * z[0], 0.5 * z[1], 0.5 * z[2]), work.turn)
     q = work.other
-    for a in range(3):
-        for b in range(3):
-            q[a, b] = 0.0
-            for k in range(3):
-                q[a, b] += work.turn[a, k] * work.middle[k, b]
+    turn_chart((0.5 * z[0], 0.5 * z[1], 0.5 * z[2]), work.middle, work.turn, q)
     for a in range(3):
         work.translation[a] = work.mean[a]
         for b in range(3):
             work.rotation[a, b] = q[b, a]
             work.translation[a] -= shape.radius * q[b, a] * z[3 + b]
+
+
+@borrowing
+def seek_from(z, top, problem, stack, work):
+    """A witness of a node, sought from a turn about the box's middle and a shift, (6,) together.
+
+    Returns:
+        See `witness_kernels.seek_witness`.
+    """
+    end_pose(z, problem.shape, work)
+    return seek_witness(
+        stack.fixed[top],
+        stack.targets[top],
+        problem.contacts,
+        problem.model,
+        work.rotation,
+        work.translation,
+        work.seeking,
+    )
 
 
 @borrowing
@@ -93,11 +107,7 @@ def coordinates(rotation, translation, radius, work, z):
     Returns:
         Whether it has them: not half a turn away.
     """
-    for a in range(3):
-        z[3 + a] = 0.0
-        for b in range(3):
-            work.turn[a, b] = rotation[b, a]
-            z[3 + a] += rotation[b, a] * (work.mean[b] - translation[b]) / radius
+    shift_of(rotation, translation, work.mean, radius, work.turn, z[3:])
     known = gibbs_between(work.middle, work.turn, z)
     for a in range(3):
         z[a] *= 2.0
@@ -119,16 +129,7 @@ def spreads(top, problem, stack, work):
         for side in (-1.0, 1.0):
             coordinates(work.best, work.shift, shape.radius, work, z)
             z[k] += side * step
-            end_pose(z, shape, work)
-            met, _ = seek_witness(
-                stack.fixed[top],
-                stack.targets[top],
-                problem.contacts,
-                problem.model,
-                work.rotation,
-                work.translation,
-                work.seeking,
-            )
+            met, _ = seek_from(z, top, problem, stack, work)
             if not met:
                 continue
             trace, square = 0.0, 0.0
@@ -193,16 +194,7 @@ def seek_inside(top, near, problem, stack, counts, work):
         work.objective[k] = 0.5 * (work.low[k] + work.high[k])
         if work.sum[6] > 0.0:
             work.objective[k] = work.sum[k] / work.sum[6]
-    end_pose(work.objective, problem.shape, work)
-    met, on_polygons = seek_witness(
-        stack.fixed[top],
-        stack.targets[top],
-        problem.contacts,
-        problem.model,
-        work.rotation,
-        work.translation,
-        work.seeking,
-    )
+    met, on_polygons = seek_from(work.objective, top, problem, stack, work)
     met = met and (not near or is_near(problem.shape.radius, work))
     if met:
         copy_pose(work.rotation, work.translation, work.best, work.shift)
@@ -231,7 +223,7 @@ def settle_leaf(top, at, problem, stack, leaves, counts, work):
         problem: see `cover.Problem`.
         stack: see `cover.Stack`.
         leaves: see `cover.Leaves`.
-        counts: see `PROGRAMS`.
+        counts: see `NODES`.
         work: see `cover.Work`.
 
     Returns:
@@ -244,7 +236,6 @@ def settle_leaf(top, at, problem, stack, leaves, counts, work):
         view(top, stack, touches, work)
         set_box(top, stack, work)
         used = cut_rows(touches, rows_of(top, stack, shape, touches, work), work)
-        counts[PROGRAMS] += 1
         share = tighten(0, 6, used, work)
         if share < 0.0:
             return GONE

@@ -123,8 +123,7 @@ def _find(entry: SolidEntry, contacts: Contacts, aim: Aim, domains: Bits) -> Fou
         problem, domains, most_nodes=aim.limits.nodes, most_found=aim.limits.budget
     )
     leaves = cover.leaves
-    _, interpretations = np.unique(leaves.fixed, axis=0, return_inverse=True)
-    labels, count = link_leaves(leaves, interpretations.reshape(-1))
+    labels, count = link_leaves(leaves, cover.interpretations)
     poses = report_components(
         *(leaves, labels, count, problem.contacts, model, problem.touches.mean, shape.radius)
     )

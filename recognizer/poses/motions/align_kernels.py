@@ -53,6 +53,20 @@ def diagonalise(matrix, vectors):
                     vectors[k, p], vectors[k, q] = c * left - s * right, s * left + c * right
 
 
+@borrowing
+def rotation_of(w, x, y, z, rotation):
+    """The rotation (3, 3) of a unit quaternion, in place."""
+    rotation[0, 0] = w * w + x * x - y * y - z * z
+    rotation[0, 1] = 2.0 * (x * y - w * z)
+    rotation[0, 2] = 2.0 * (x * z + w * y)
+    rotation[1, 0] = 2.0 * (x * y + w * z)
+    rotation[1, 1] = w * w - x * x + y * y - z * z
+    rotation[1, 2] = 2.0 * (y * z - w * x)
+    rotation[2, 0] = 2.0 * (x * z - w * y)
+    rotation[2, 1] = 2.0 * (y * z + w * x)
+    rotation[2, 2] = w * w - x * x - y * y + z * z
+
+
 @kernel
 def align(count, faces, model, half_angles, contacts, rotation):
     """The rotation that fits the normals best, written in place.
@@ -111,15 +125,7 @@ def align(count, faces, model, half_angles, contacts, rotation):
         if k != best:
             second = max(second, k4[k, k])
     w, x, y, z = vectors[0, best], vectors[1, best], vectors[2, best], vectors[3, best]
-    rotation[0, 0] = w * w + x * x - y * y - z * z
-    rotation[0, 1] = 2.0 * (x * y - w * z)
-    rotation[0, 2] = 2.0 * (x * z + w * y)
-    rotation[1, 0] = 2.0 * (x * y + w * z)
-    rotation[1, 1] = w * w - x * x + y * y - z * z
-    rotation[1, 2] = 2.0 * (y * z - w * x)
-    rotation[2, 0] = 2.0 * (x * z - w * y)
-    rotation[2, 1] = 2.0 * (y * z + w * x)
-    rotation[2, 2] = w * w - x * x - y * y + z * z
+    rotation_of(w, x, y, z, rotation)
     # The sum is 2 total - 2 q^T K q, and turning by s about the vaguest axis adds
     # 2 (best - second) sin^2(s / 2) to it.
     slack = budget - 2.0 * (total - k4[best, best]) + ROUNDING
