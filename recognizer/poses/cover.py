@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from ..contacts.contacts import Contacts
 from .cover_kernels import advance, begin
 from .fits.pose import kernel_contacts
+from .known import Known, nothing_known
 from .leaf_kernels import COUNTS, CUT, HEIGHT, NODES, TRIED
 from .node_kernels import OPEN
 from .shape import Shape, Touches, touches_of
@@ -28,9 +29,9 @@ ROWS = 28
 """Rows of a contact, on average, that there is room for; what finds none is left out."""
 CUTS = 4
 """Cuts of a contact, likewise."""
-DEEP = 120
+DEEP = 240
 """Levels of a search, beside one for each contact: a box is cut in two about 30 times across each
-turn until rounding ends it."""
+turn or shift until rounding ends it."""
 STEPS = 10_000
 """Nodes between two looks at the limits: about a tenth of a second."""
 MOST_LEAVES = 256
@@ -81,6 +82,7 @@ class Problem(NamedTuple):
     touches: Touches
     tables: Tables
     aims: Aims
+    known: Known
 
 
 class Stack(NamedTuple):
@@ -144,6 +146,8 @@ class Work(NamedTuple):
     """(3,) ... half sides of the turns about it, ..."""
     facings: Floats
     """(n, 3) ... normals turned by it, ..."""
+    fronts: Floats
+    """(n, 3) ... ways back along approaches likewise, ..."""
     directions: Floats
     """(d, 3) ... the directions of slabs turned back by it, and ..."""
     ways: Floats
@@ -154,16 +158,23 @@ class Work(NamedTuple):
     high: Floats
     columns: Floats
     """(7, m) rows and limits."""
+    latest: Ints
+    """(n + 2,) the interpretation that was cut last, how often, and how often any was."""
+    still: Floats
+    """(3,) zeros: what no shift changes."""
+    lever: Floats
+    best_place: Floats
+    slope: Floats
     programs: Any
     """See `simplex_kernels.simplex_space`."""
     objective: Floats
     seen: Floats
     sum: Floats
     """(7,) see `polytope_kernels.tighten`."""
+    cut_arms: Floats
+    """(c, 3) places about the contacts' mean, in radii, ..."""
     cuts: Floats
-    """(c, 4) directions, and how far out along them the polygon reaches, in radii."""
-    cut_of: Ints
-    """(c,) the contact of each."""
+    """(c, 4) ... directions, and how far out along them each can be."""
     cut_count: Ints
     """(1,)"""
     rotation: Floats
@@ -210,7 +221,8 @@ def search_cover(
     """
     n, words = domains.shape
     directions = len(problem.shape.directions)
-    stack, work = _stack(n, words, directions), work_space(n, directions, problem.touches.mean)
+    stack = _stack(n, words, directions)
+    work = work_space(n, directions, problem.touches.mean, problem.known)
     stack.domains[0] = domains
     stack.rooms[0] = -np.inf, np.inf
     tables = problem.tables
@@ -245,7 +257,13 @@ def join(parts: Sequence[Leaves]) -> Leaves:
 
 
 def problem_of(
-    shape: Shape, model: Any, packed: Floats, contacts: Contacts, switches: int, aims: Aims
+    shape: Shape,
+    model: Any,
+    packed: Floats,
+    contacts: Contacts,
+    switches: int,
+    aims: Aims,
+    known: Known | None = None,
 ) -> Problem:
     """What a search for poses of a solid reads.
 
@@ -256,11 +274,13 @@ def problem_of(
         contacts: at least one.
         switches: bits, which constraints on pairs to apply.
         aims: what it is to find out.
+        known: what is known besides the contacts.
     """
     touches, count = touches_of(contacts, shape.radius), len(contacts)
     readings = np.empty((count, count, 9))
     tables = Tables(packed, shape.half_angles, readings, touches.errors, switches)
-    return Problem(shape, model, kernel_contacts(contacts), touches, tables, aims)
+    known = known or nothing_known(count)
+    return Problem(shape, model, kernel_contacts(contacts), touches, tables, aims, known)
 
 
 def _stack(n: int, words: int, directions: int) -> Stack:
@@ -295,25 +315,43 @@ def _leaves(n: int, most: int) -> Leaves:
     )
 
 
-def work_space(n: int, directions: int, mean: Floats) -> Work:
-    """Work space for so many contacts, of a mean (3,), metres, and directions of slabs."""
-    empty, rows, cuts = np.empty, ROWS * n, CUTS * n
+def seeking_space(n: int, paths: int) -> Any:
+    """Work space for `witness_kernels.seek_witness`, for so many contacts and free paths."""
+    empty = np.empty
     readings = (
         *(empty((n, 3)), empty(n), empty(n), empty(n, np.int64), empty(n, np.int64)),
         *(empty(n), empty((n, 3))),
     )
+    return (
+        *(readings, empty((n, 3)), empty((n, 3)), empty((6, 6)), np.zeros((6, 6))),
+        *(empty(6), empty(6), empty(6), empty(3), empty(3), empty(3), empty((3, 3)), empty(3)),
+        *((empty(3), empty(3), empty(3), empty(3), empty(3), empty(3)), np.zeros(paths, np.bool_)),
+    )
+
+
+def work_space(n: int, directions: int, mean: Floats, known: Known | None = None) -> Work:
+    """Work space for so many contacts, of a mean (3,), metres, and directions of slabs."""
+    known = known or nothing_known(n)
+    extra = len(known.corners) + len(known.feet) + len(known.starts)
+    empty, rows, cuts = np.empty, ROWS * n + extra, CUTS * n + len(known.starts)
     return Work(
         turn=empty((3, 3)),
         other=empty((3, 3)),
         middle=empty((3, 3)),
         half=empty(3),
         facings=empty((n, 3)),
+        fronts=empty((n, 3)),
         directions=empty((directions, 3)),
         ways=empty((n, directions, 2)),
         hull=empty((directions, 2)),
         low=empty(6),
         high=empty(6),
         columns=empty((7, rows)),
+        latest=np.zeros(n + 2, np.int64),
+        still=np.zeros(3),
+        lever=empty(3),
+        best_place=empty(3),
+        slope=empty(3),
         programs=(
             *(empty(6, np.int64), empty((6, 6)), empty(6), empty(6), empty(6), empty(6)),
             *(empty(rows), empty(rows), empty(rows), np.zeros(1, np.bool_)),
@@ -321,15 +359,12 @@ def work_space(n: int, directions: int, mean: Floats) -> Work:
         objective=empty(6),
         seen=empty((6, 2)),
         sum=empty(7),
+        cut_arms=empty((cuts, 3)),
         cuts=empty((cuts, 4)),
-        cut_of=empty(cuts, np.int64),
         cut_count=np.zeros(1, np.int64),
         rotation=empty((3, 3)),
         translation=empty(3),
-        seeking=(
-            *(readings, empty((n, 3)), empty((n, 3)), empty((6, 6)), np.zeros((6, 6))),
-            *(empty(6), empty(6), empty(6), empty(3), empty(3), empty(3), empty((3, 3)), empty(3)),
-        ),
+        seeking=seeking_space(n, len(known.starts)),
         best=empty((3, 3)),
         shift=empty(3),
         mean=mean.copy(),
