@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 from ..contacts.contacts import Contacts
 from .cover_kernels import advance, begin
 from .fits.pose import kernel_contacts
-from .known import Known, nothing_known
 from .leaf_kernels import COUNTS, CUT, HEIGHT, NODES, TRIED
 from .node_kernels import OPEN
 from .shape import Shape, Touches, touches_of
@@ -29,9 +28,9 @@ ROWS = 28
 """Rows of a contact, on average, that there is room for; what finds none is left out."""
 CUTS = 4
 """Cuts of a contact, likewise."""
-DEEP = 240
+DEEP = 120
 """Levels of a search, beside one for each contact: a box is cut in two about 30 times across each
-turn or shift until rounding ends it."""
+turn until rounding ends it."""
 STEPS = 10_000
 """Nodes between two looks at the limits: about a tenth of a second."""
 MOST_LEAVES = 256
@@ -62,9 +61,8 @@ class Aims(NamedTuple):
     """Ways to assign what is left up to which they are tried one by one."""
     coarse: float
     """How far turns about a box's axis may move contacts, in radii, when features are tried."""
-    turns: int
-    """How many turns normals may leave open of the rotations in which features are tried: none, one
-    about an axis, or all three."""
+    vague: bool
+    """Whether normals don't say where to begin."""
     turn: float
     """Poses whose rotations are no farther apart than this, radians, ..."""
     shift: float
@@ -82,7 +80,6 @@ class Problem(NamedTuple):
     touches: Touches
     tables: Tables
     aims: Aims
-    known: Known
 
 
 class Stack(NamedTuple):
@@ -144,12 +141,10 @@ class Work(NamedTuple):
     """(3, 3) world to object: the middle of the box that was viewed last, ..."""
     half: Floats
     """(3,) ... half sides of the turns about it, ..."""
+    arms: Floats
+    """(n, 3) ... contacts about their mean, and ..."""
     facings: Floats
-    """(n, 3) ... normals turned by it, ..."""
-    fronts: Floats
-    """(n, 3) ... ways back along approaches likewise, ..."""
-    directions: Floats
-    """(d, 3) ... the directions of slabs turned back by it, and ..."""
+    """(n, 3) ... normals, both turned by it, and ..."""
     ways: Floats
     """(n, d, 2) ... extents of the arms in the box."""
     hull: Floats
@@ -158,23 +153,16 @@ class Work(NamedTuple):
     high: Floats
     columns: Floats
     """(7, m) rows and limits."""
-    latest: Ints
-    """(n + 2,) the interpretation that was cut last, how often, and how often any was."""
-    still: Floats
-    """(3,) zeros: what no shift changes."""
-    lever: Floats
-    best_place: Floats
-    slope: Floats
     programs: Any
     """See `simplex_kernels.simplex_space`."""
     objective: Floats
     seen: Floats
     sum: Floats
     """(7,) see `polytope_kernels.tighten`."""
-    cut_arms: Floats
-    """(c, 3) places about the contacts' mean, in radii, ..."""
     cuts: Floats
-    """(c, 4) ... directions, and how far out along them each can be."""
+    """(c, 4) directions, and how far out along them the polygon reaches, in radii."""
+    cut_of: Ints
+    """(c,) the contact of each."""
     cut_count: Ints
     """(1,)"""
     rotation: Floats
@@ -187,10 +175,6 @@ class Work(NamedTuple):
     """(3,) of the contacts, metres."""
     form: Floats
     vectors: Floats
-    charts: Floats
-    """(2, 3, 3) see `first_box_kernels.first_boxes`, and ..."""
-    sides: Floats
-    """... (2, 3) likewise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,8 +205,7 @@ def search_cover(
     """
     n, words = domains.shape
     directions = len(problem.shape.directions)
-    stack = _stack(n, words, directions)
-    work = work_space(n, directions, problem.touches.mean, problem.known)
+    stack, work = _stack(n, words, directions), work_space(n, directions, problem.touches.mean)
     stack.domains[0] = domains
     stack.rooms[0] = -np.inf, np.inf
     tables = problem.tables
@@ -257,13 +240,7 @@ def join(parts: Sequence[Leaves]) -> Leaves:
 
 
 def problem_of(
-    shape: Shape,
-    model: Any,
-    packed: Floats,
-    contacts: Contacts,
-    switches: int,
-    aims: Aims,
-    known: Known | None = None,
+    shape: Shape, model: Any, packed: Floats, contacts: Contacts, switches: int, aims: Aims
 ) -> Problem:
     """What a search for poses of a solid reads.
 
@@ -274,13 +251,11 @@ def problem_of(
         contacts: at least one.
         switches: bits, which constraints on pairs to apply.
         aims: what it is to find out.
-        known: what is known besides the contacts.
     """
     touches, count = touches_of(contacts, shape.radius), len(contacts)
     readings = np.empty((count, count, 9))
     tables = Tables(packed, shape.half_angles, readings, touches.errors, switches)
-    known = known or nothing_known(count)
-    return Problem(shape, model, kernel_contacts(contacts), touches, tables, aims, known)
+    return Problem(shape, model, kernel_contacts(contacts), touches, tables, aims)
 
 
 def _stack(n: int, words: int, directions: int) -> Stack:
@@ -315,43 +290,25 @@ def _leaves(n: int, most: int) -> Leaves:
     )
 
 
-def seeking_space(n: int, paths: int) -> Any:
-    """Work space for `witness_kernels.seek_witness`, for so many contacts and free paths."""
-    empty = np.empty
+def work_space(n: int, directions: int, mean: Floats) -> Work:
+    """Work space for so many contacts, of a mean (3,), metres, and directions of slabs."""
+    empty, rows, cuts = np.empty, ROWS * n, CUTS * n
     readings = (
         *(empty((n, 3)), empty(n), empty(n), empty(n, np.int64), empty(n, np.int64)),
         *(empty(n), empty((n, 3))),
     )
-    return (
-        *(readings, empty((n, 3)), empty((n, 3)), empty((6, 6)), np.zeros((6, 6))),
-        *(empty(6), empty(6), empty(6), empty(3), empty(3), empty(3), empty((3, 3)), empty(3)),
-        *((empty(3), empty(3), empty(3), empty(3), empty(3), empty(3)), np.zeros(paths, np.bool_)),
-    )
-
-
-def work_space(n: int, directions: int, mean: Floats, known: Known | None = None) -> Work:
-    """Work space for so many contacts, of a mean (3,), metres, and directions of slabs."""
-    known = known or nothing_known(n)
-    extra = len(known.corners) + len(known.feet) + len(known.starts)
-    empty, rows, cuts = np.empty, ROWS * n + extra, CUTS * n + len(known.starts)
     return Work(
         turn=empty((3, 3)),
         other=empty((3, 3)),
         middle=empty((3, 3)),
         half=empty(3),
+        arms=empty((n, 3)),
         facings=empty((n, 3)),
-        fronts=empty((n, 3)),
-        directions=empty((directions, 3)),
         ways=empty((n, directions, 2)),
         hull=empty((directions, 2)),
         low=empty(6),
         high=empty(6),
         columns=empty((7, rows)),
-        latest=np.zeros(n + 2, np.int64),
-        still=np.zeros(3),
-        lever=empty(3),
-        best_place=empty(3),
-        slope=empty(3),
         programs=(
             *(empty(6, np.int64), empty((6, 6)), empty(6), empty(6), empty(6), empty(6)),
             *(empty(rows), empty(rows), empty(rows), np.zeros(1, np.bool_)),
@@ -359,17 +316,18 @@ def work_space(n: int, directions: int, mean: Floats, known: Known | None = None
         objective=empty(6),
         seen=empty((6, 2)),
         sum=empty(7),
-        cut_arms=empty((cuts, 3)),
         cuts=empty((cuts, 4)),
+        cut_of=empty(cuts, np.int64),
         cut_count=np.zeros(1, np.int64),
         rotation=empty((3, 3)),
         translation=empty(3),
-        seeking=seeking_space(n, len(known.starts)),
+        seeking=(
+            *(readings, empty((n, 3)), empty((n, 3)), empty((6, 6)), np.zeros((6, 6))),
+            *(empty(6), empty(6), empty(6), empty(3), empty(3), empty(3), empty((3, 3)), empty(3)),
+        ),
         best=empty((3, 3)),
         shift=empty(3),
         mean=mean.copy(),
         form=empty((4, 4)),
         vectors=empty((4, 4)),
-        charts=empty((2, 3, 3)),
-        sides=empty((2, 3)),
     )

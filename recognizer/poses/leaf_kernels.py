@@ -15,18 +15,17 @@ from ..compiling import borrowing
 from .boxes_kernels import gibbs_between, shift_of, turn_chart
 from .motions.motion_kernels import copy_pose
 from .node_kernels import view
-from .path_kernels import heed_paths
 from .polytope_kernels import tighten
 from .shrink_kernels import cut_rows, keep_box, note_cuts, rows_of, set_box
-from .witness_kernels import CONTACTS, NONE, POLYGONS, WITNESS, seek_witness
+from .witness_kernels import seek_witness
 
 NODES, TRIED, HEIGHT, CUT = 0, 1, 2, 3
 """Places of counts: nodes looked at; searches for a witness; how many nodes are on the stack;
 whether one was left out for want of room."""
 COUNTS = 4
-GONE, LEAF, CUT_UP, BY_PIECES, CUT_ANY = 0, 1, 2, 3, 4
-"""What becomes of a node: no pose is left; it is a leaf; it is to be cut across a turn, by the
-convex pieces of a concave face, or across a turn or a shift."""
+GONE, LEAF, CUT_UP, BY_PIECES = 0, 1, 2, 3
+"""What becomes of a node: no pose is left; it is a leaf; it is to be cut across a turn, or by the
+convex pieces of a concave face."""
 ROUNDS = 3
 """Times that a box is tightened before it is told whether its poses are far apart."""
 SHRINKS = 0.7
@@ -39,11 +38,6 @@ FINE = 0.2
 """Bounds that linearising may leave out of a box that counts as known."""
 FINEST = 0.02
 """The same, of a box without a witness that is not cut further: it is left undecided."""
-PATIENCE, POOL = 20, 100
-"""Boxes that contacts allow, and that are cut for what else is known: of one interpretation, and of
-all together."""
-LOOSE = 0.5
-"""Bounds of what is known besides contacts, that a box without a witness may be wide."""
 NEARBY = 1e-6
 """Radians, and radii: a box may be a point."""
 
@@ -58,7 +52,7 @@ def coarseness(top, stack, touches, work):
     for j in range(len(touches.arms)):
         if stack.fixed[top, j] < 0:
             continue
-        a = touches.arms[j]
+        a = work.arms[j]
         length = np.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
         worst = max(worst, 0.5 * square * length / touches.reaches[j])
         if touches.errors[j] < 0.5 * np.pi:
@@ -88,10 +82,8 @@ def end_pose(z, shape, work):
 
 
 @borrowing
-def seek_from(z, heeding, top, problem, stack, work):
+def seek_from(z, top, problem, stack, work):
     """A witness of a node, sought from a turn about the box's middle and a shift, (6,) together.
-
-    It breaks nothing else that is known, if that is heeded.
 
     Returns:
         See `witness_kernels.seek_witness`.
@@ -102,8 +94,6 @@ def seek_from(z, heeding, top, problem, stack, work):
         stack.targets[top],
         problem.contacts,
         problem.model,
-        problem.known,
-        heeding and problem.known.anything,
         work.rotation,
         work.translation,
         work.seeking,
@@ -126,10 +116,9 @@ def coordinates(rotation, translation, radius, work, z):
 
 @borrowing
 def spreads(top, problem, stack, work):
-    """Whether a pose within the bounds on contacts is farther from the witness than alike.
+    """Whether a pose within the bounds is farther from the witness than alike.
 
-    What else is known is not asked here: a box is then told as wider than it is. The pose is sought
-    from twice as far, along each axis along which the box is so wide.
+    It is sought from twice as far, along each axis along which the box is so wide.
     """
     shape, aims = problem.shape, problem.aims
     z, least = work.objective, 1.0 + 2.0 * np.cos(aims.turn)
@@ -140,7 +129,8 @@ def spreads(top, problem, stack, work):
         for side in (-1.0, 1.0):
             coordinates(work.best, work.shift, shape.radius, work, z)
             z[k] += side * step
-            if seek_from(z, False, top, problem, stack, work) != WITNESS:
+            met, _ = seek_from(z, top, problem, stack, work)
+            if not met:
                 continue
             trace, square = 0.0, 0.0
             for a in range(3):
@@ -181,12 +171,6 @@ def emit(top, proven, at, stack, leaves, work):
         )
         leaves.translations[at, a] = work.translation[a]
     leaves.proven[at] = proven
-    if proven:
-        # It has a witness.
-        n = stack.fixed.shape[1]
-        for j in range(n):
-            work.latest[j] = stack.fixed[top, j]
-        work.latest[n] = PATIENCE
 
 
 @borrowing
@@ -203,19 +187,18 @@ def seek_inside(top, near, problem, stack, counts, work):
         work: see `cover.Work`.
 
     Returns:
-        See `witness_kernels.seek_witness`; `CONTACTS` if there is one, but not near.
+        Whether one was found, and whether one was on the polygons that stand for the faces.
     """
     counts[TRIED] += 1
     for k in range(6):
         work.objective[k] = 0.5 * (work.low[k] + work.high[k])
         if work.sum[6] > 0.0:
             work.objective[k] = work.sum[k] / work.sum[6]
-    found = seek_from(work.objective, True, top, problem, stack, work)
-    if found == WITNESS:
-        if near and not is_near(problem.shape.radius, work):
-            return CONTACTS
+    met, on_polygons = seek_from(work.objective, top, problem, stack, work)
+    met = met and (not near or is_near(problem.shape.radius, work))
+    if met:
         copy_pose(work.rotation, work.translation, work.best, work.shift)
-    return found
+    return met, on_polygons
 
 
 @borrowing
@@ -228,45 +211,6 @@ def is_near(radius, work):
         if away > 1.5 * (work.high[k] - work.low[k]) + NEARBY:
             return False
     return True
-
-
-@borrowing
-def slack_left(angle, problem, work):
-    """How far poses of a tightened box move the solid, at most, in the least of the bounds."""
-    known, square = problem.known, 0.0
-    least = known.slack if len(known.corners) > 0 else np.inf
-    for s in range(len(known.scales)):
-        least = min(least, known.scales[s])
-    for k in range(3, 6):
-        square += (0.5 * (work.high[k] - work.low[k])) ** 2
-    return (angle + np.sqrt(square)) * problem.shape.radius / least
-
-
-@borrowing
-def is_worth_it(top, stack, work):
-    """Whether to go on looking for a witness of an interpretation, or a proof that it has none.
-
-    Not if it has one: what else may be left of it is told as open. Nor if it took too long.
-    """
-    n, same = stack.fixed.shape[1], True
-    for j in range(n):
-        same &= work.latest[j] == stack.fixed[top, j]
-        work.latest[j] = stack.fixed[top, j]
-    if not same:
-        work.latest[n] = 0
-    work.latest[n] += 1
-    work.latest[n + 1] += 1
-    return work.latest[n] < PATIENCE and work.latest[n + 1] < POOL
-
-
-@borrowing
-def longest_side(work):
-    """The longest side of a tightened box, turns counted at a radius."""
-    best = 0
-    for k in range(1, 6):
-        if work.high[k] - work.low[k] > work.high[best] - work.low[best]:
-            best = k
-    return best
 
 
 @borrowing
@@ -283,24 +227,24 @@ def settle_leaf(top, at, problem, stack, leaves, counts, work):
         work: see `cover.Work`.
 
     Returns:
-        `GONE`, `LEAF`, `CUT_UP`, `BY_PIECES` or `CUT_ANY`.
+        `GONE`, `LEAF`, `CUT_UP` or `BY_PIECES`.
     """
     shape, touches, aims = problem.shape, problem.touches, problem.aims
     work.cut_count[0] = 0
-    found, tries, coarse, angle = NONE, 0, np.inf, np.pi
+    on_polygons, met, tries, coarse = False, False, 0, np.inf
     for turn in range(2 * ROUNDS):
-        view(top, stack, shape, touches, work)
+        view(top, stack, touches, work)
         set_box(top, stack, work)
-        used = cut_rows(rows_of(top, stack, problem, work), work)
+        used = cut_rows(touches, rows_of(top, stack, shape, touches, work), work)
         share = tighten(0, 6, used, work)
         if share < 0.0:
             return GONE
         keep_box(top, stack, work)
         coarse, angle = coarseness(top, stack, touches, work)
         handy = angle < HANDY or coarse < 1.0
-        if found != WITNESS and (found != CONTACTS or share > STUCK):
-            found = seek_inside(top, handy, problem, stack, counts, work)
-        if found == WITNESS:
+        if not met:
+            met, on_polygons = seek_inside(top, handy, problem, stack, counts, work)
+        if met:
             if coarse > FINE and not alike(top, angle, stack, aims):
                 if handy and share < SHRINKS and turn < ROUNDS:
                     continue
@@ -309,25 +253,14 @@ def settle_leaf(top, at, problem, stack, leaves, counts, work):
             copy_pose(work.best, work.shift, work.rotation, work.translation)
             emit(top, True, at, stack, leaves, work)
             return LEAF
-        if found == POLYGONS and on_pieces(top, stack, shape) >= 0:
-            return BY_PIECES
         if not handy:
             return CUT_UP
+        if on_polygons and on_pieces(top, stack, shape) >= 0:
+            return BY_PIECES
         tries += 1
-        if tries > 1 and share > STUCK and (coarse > FINEST or found == CONTACTS):
+        if tries > 1 and coarse > FINEST and share > STUCK:
             break
         note_cuts(top, problem, stack, work)
-        if problem.known.anything:
-            for k in range(6):
-                work.objective[k] = 0.5 * (work.low[k] + work.high[k]) if k >= 3 else 0.0
-            end_pose(work.objective, shape, work)
-            if not heed_paths(problem, work):
-                return GONE
-    if found == CONTACTS and problem.known.anything:
-        if slack_left(angle, problem, work) > LOOSE and is_worth_it(top, stack, work):
-            return CUT_ANY
-        emit(top, False, at, stack, leaves, work)
-        return LEAF
     if coarse >= FINEST:
         return CUT_UP
     if on_pieces(top, stack, shape) >= 0:

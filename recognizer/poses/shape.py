@@ -59,10 +59,6 @@ class Touches(NamedTuple):
     """(n,) bounds on positions."""
     errors: Floats
     """(n,) bounds on normals, radians."""
-    fronts: Floats
-    """(n, 3) the way back along each approach, unit; zero where that is unknown."""
-    seen: NDArray[np.bool_]
-    """(n,) whether it is known."""
     mean: Floats
     """(3,) of the positions, metres."""
 
@@ -75,8 +71,6 @@ def touches_of(contacts: Contacts, radius: float) -> Touches:
         contacts.normals.copy(),
         contacts.position_error / radius,
         contacts.normal_error.copy(),
-        -contacts.approaches,
-        contacts.approach_known,
         mean,
     )
 

@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..contacts.contacts import Contacts
-from ..contacts.support import StableFace
 from ..models.polyhedron import Polyhedron
 from ..tree.limits import SearchLimits
 from ..tree.tree import Constraints
 from .component_kernels import link_leaves, report_components
-from .cover import Aims, problem_of, search_cover, seeking_space
+from .cover import Aims, problem_of, search_cover
 from .fits.pose import Poses
-from .known import NOWHERE, Surroundings, known_of
 from .solid import Bits, SolidEntry, bit_set
+from .surroundings.surroundings import Surroundings, clear
 
 EXACT_SYMMETRY = 1e-7
 """How far a symmetry may miss, as a share of the smallest bound on a position, to stand for a part
@@ -27,8 +25,6 @@ COARSE, COARSEST = 5.0, 0.1
 """How far turns about a box's axis may move contacts when their features are tried: in bounds on
 positions, and at least so many radii. Features of wider boxes are mostly left by what rules out
 nothing."""
-FEW = 3
-"""Contacts up to which, this not included, features are chosen before rotations."""
 ROUNDING = 1e-12
 """Of a cosine."""
 
@@ -92,8 +88,10 @@ def find_poses(
     )
     if symmetric:
         domains[0] &= entry.orbits
-    found = _find(entry, contacts, aim, domains, surroundings)
+    found = _find(entry, contacts, aim, domains)
     poses = found.poses
+    if not surroundings.says_nothing(contacts):
+        poses = clear(entry.model, entry.features, poses, contacts, surroundings)
     if symmetric:
         poses = _spread_over_symmetries(entry.model, poses, permutations)
     return replace(found, poses=poses)
@@ -108,51 +106,28 @@ def _domains(entry: SolidEntry, contacts: Contacts, known: NDArray[np.int32] | N
     return domains
 
 
-def _find(
-    entry: SolidEntry,
-    contacts: Contacts,
-    aim: Aim,
-    domains: Bits,
-    surroundings: Surroundings,
-    feet: Sequence[StableFace] = (),
-    square: int = NOWHERE,
-) -> Found:
-    """The same, with the features that each contact may be on.
-
-    Args:
-        feet: faces of its hull that the solid may stand on, if it does.
-        square: the feature that stands for the first, if the first contact says which it is.
-    """
-    upright, contacts = _upright(contacts)
+def _find(entry: SolidEntry, contacts: Contacts, aim: Aim, domains: Bits) -> Found:
+    """The same where nothing else is known, with the features that each contact may be on."""
     shape, model = entry.shape, entry.test.model
     largest = float(contacts.position_error.max()) / shape.radius
     aims = Aims(
         spare=aim.outliers,
         crowd=float(aim.limits.crowd),
         coarse=max(COARSE * largest, COARSEST),
-        turns=_open_turns(contacts),
+        vague=_vague(contacts),
         turn=aim.turn,
         shift=aim.shift / shape.radius,
     )
-    known = known_of(entry.model, contacts, surroundings, upright, feet, square)
-    problem = problem_of(*(shape, model, entry.packed, contacts, aim.constraints.bits, aims), known)
+    problem = problem_of(shape, model, entry.packed, contacts, aim.constraints.bits, aims)
     cover = search_cover(
         problem, domains, most_nodes=aim.limits.nodes, most_found=aim.limits.budget
     )
     leaves = cover.leaves
     labels, count = link_leaves(leaves, cover.interpretations)
-    poses = Poses(
-        *report_components(
-            *(leaves, labels, count, problem),
-            seeking_space(len(contacts), len(known.starts)),
-        )
+    poses = report_components(
+        *(leaves, labels, count, problem.contacts, model, problem.touches.mean, shape.radius)
     )
-    poses = replace(
-        poses,
-        rotations=np.ascontiguousarray(upright.T @ poses.rotations),
-        translations=np.ascontiguousarray(poses.translations @ upright),
-    )
-    return Found(poses, cover.nodes, cover.tried, cover.complete)
+    return Found(Poses(*poses), cover.nodes, cover.tried, cover.complete)
 
 
 def _find_standing(
@@ -162,33 +137,32 @@ def _find_standing(
     surroundings: Surroundings,
     known: NDArray[np.int32] | None,
 ) -> Found:
-    """The search of a solid that stands on a face of its hull: the support is one more contact."""
+    """The search of a solid that stands on a face of its hull: each such face in its turn.
+
+    The support is one more contact, on that face.
+    """
     support = surroundings.support
     assert support is not None
-    standing, stable = entry.standing, entry.stable_faces
+    standing = entry.standing
     count, size = len(entry.features), len(standing.features)
     own = _domains(entry, contacts, known)
     domains = np.zeros((len(contacts) + 1, -(-size // 64)), np.uint64)
     domains[1:, : own.shape[1]] = own
     parts: list[Found] = []
-    alike: dict[float, tuple[Contacts, list[int]]] = {}
-    for index, face in enumerate(stable):
+    plain: Found | None = None
+    for index, face in enumerate(entry.stable_faces):
         touch = support.touch(face, entry.model.diameter, contacts, aim.outliers)
         if touch is None:
-            # Bounds so wide that the face's plane, as a contact, says nothing: its corners do.
-            parts.append(_find(entry, contacts, aim, own, surroundings, [face]))
+            # Bounds so wide that the face's plane, as a contact, says nothing: only the pose does.
+            plain = plain or _find(entry, contacts, aim, own)
+            poses = clear(entry.model, entry.features, plain.poses, contacts, surroundings, face)
+            parts.append(replace(plain, poses=poses))
             continue
-        # Faces of about one width are one search, with the widest of their bounds.
-        step = np.ceil(np.log2(touch.normal_error[0]))
-        widest, members = alike.setdefault(step, (touch, []))
-        members.append(index)
-        if touch.normal_error[0] > widest.normal_error[0]:
-            alike[step] = touch, members
-    for touch, members in alike.values():
         everything = Contacts.join([touch, contacts])
-        domains[0] = bit_set(count + np.array(members), size)
-        found = _find(standing, everything, aim, domains, surroundings, stable, count)
+        domains[0] = bit_set(np.array([count + index]), size)
+        found = _find(standing, everything, aim, domains)
         poses = found.poses.take(found.poses.faces[:, 0] >= 0)
+        poses = clear(entry.model, standing.features, poses, everything, surroundings, face)
         poses = replace(poses, faces=np.ascontiguousarray(poses.faces[:, 1:]))
         parts.append(replace(found, poses=poses))
     return Found(
@@ -199,48 +173,17 @@ def _find_standing(
     )
 
 
-def _upright(contacts: Contacts) -> tuple[Floats, Contacts]:
-    """A rotation (3, 3) that brings what normals have in common upright, and contacts turned by it.
-
-    Where they leave a turn about it open, boxes are then along that turn.
-    """
-    known = contacts.normal_error < math.pi / 2.0
-    axis = np.array([0.0, 0.0, 1.0])
-    if known.any():
-        normals, errors = contacts.normals[known], contacts.normal_error[known]
-        surest = normals[errors.argmin()]
-        weights = np.where(normals @ surest < 0.0, -1.0, 1.0) / errors**2
-        axis = weights @ normals
-        axis /= np.linalg.norm(axis)
-    one = np.cross(axis, np.eye(3)[np.abs(axis).argmin()])
-    one /= np.linalg.norm(one)
-    turn = np.array([one, np.cross(axis, one), axis])
-    return turn, Contacts.trusted(
-        np.ascontiguousarray(contacts.positions @ turn.T),
-        np.ascontiguousarray(contacts.normals @ turn.T),
-        position_error=contacts.position_error,
-        normal_error=contacts.normal_error,
-        approaches=np.ascontiguousarray(contacts.approaches @ turn.T),
-        kinds=contacts.kinds,
+def _vague(contacts: Contacts) -> bool:
+    """Whether the known normals leave the rotation open: fewer than two, or maybe all parallel."""
+    rows = zip(contacts.normals, contacts.normal_error.tolist(), strict=True)
+    known = ((normal, error) for normal, error in rows if error < math.pi / 2.0)
+    first, first_error = next(known, (None, 0.0))
+    # If none surely leans away from the first, two others are about as parallel. Contacts come in
+    # an order that has those that lean most first, so mostly the second says it.
+    return first is None or all(
+        abs(first @ normal) >= math.cos(min(first_error + error, math.pi / 2.0)) - ROUNDING
+        for normal, error in known
     )
-
-
-def _open_turns(contacts: Contacts) -> int:
-    """How many turns normals may leave open of the rotations in which features are tried.
-
-    None where all normals are known, or two lean apart: what a contact is on says more of a pose
-    than a rotation, and what leaves a family of poses is told as it is. All three where no normal
-    is known, and one, about an axis, where those that are may all be parallel.
-    """
-    known = contacts.normal_error < math.pi / 2.0
-    if known.all() or len(contacts) < FEW:
-        return 0
-    if not known.any():
-        return 3
-    normals, errors = contacts.normals[known], contacts.normal_error[known]
-    # If none surely leans away from the first, two others are about as parallel.
-    leans = np.cos(np.minimum(errors[0] + errors, math.pi / 2.0)) - ROUNDING
-    return int((np.abs(normals @ normals[0])[1:] >= leans[1:]).all())
 
 
 def _spread_over_symmetries(

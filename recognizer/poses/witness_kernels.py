@@ -11,12 +11,8 @@ import numpy as np
 
 from ..compiling import borrowing
 from ..contacts.reading_kernels import ARC, NO_CONE, carry, meets_all, read
-from .breach_kernels import ANEW, UNBROKEN, breaks_known
-from .heeding_kernels import hindering
 from .motions.motion_kernels import add_row, copy_pose, move, slope_row, solve
 
-NONE, POLYGONS, CONTACTS, WITNESS = 0, 1, 2, 3
-"""What a search for a witness came to."""
 SHARES = np.array([0.7, 0.9, 0.98, 1.0])
 """Of the bounds, that are aimed at in turn, ..."""
 STEPS = 10
@@ -25,73 +21,44 @@ SMALL = 1e-9
 """Damping, as a share of the stiffness: along what no reading bears on the pose stays."""
 EXACT = 1e-9
 """By how much a witness may exceed a bound, as a share of it: rounding."""
-STALLED = 0.999
-"""A share of what is exceeded; if more is left after a step, more of them are in vain."""
-SHORTEST = 3
-"""Times that a step is shortened before it is given up."""
 LONGEST = 0.5
 """The longest step, in radii: the linear picture holds for a fraction of a radian only."""
 
 
 @borrowing
-def seek_witness(faces, targets, contacts, model, known, heeding, rotation, translation, space):
-    """Move a pose to where it meets every bound, and breaks nothing that is known.
+def seek_witness(faces, targets, contacts, model, rotation, translation, space):
+    """Move a pose to where it meets every bound.
 
     Args:
         faces: (n,) the feature of each contact, below zero for none.
         targets: (n,) the polygon that stands for it.
         contacts: see `pose.kernel_contacts`.
         model: see `pose.ModelTest`.
-        known: see `known.Known`.
-        heeding: whether it counts.
         rotation: (3, 3) object to world, moved in place.
         translation: (3,) metres, likewise.
-        space: see `cover.seeking_space`: readings (see `reading_kernels.read`), (n, 3) places and
-            normals in the object's frame, and work space.
+        space: readings (see `reading_kernels.read`), (n, 3) places and normals in the object's
+            frame, and work space.
 
     Returns:
-        `WITNESS`; `CONTACTS`, if it met all bounds on contacts on the way; `POLYGONS`, if it met
-        those on the polygons; or `NONE`.
+        Whether it does, on concave faces as they are; and whether it does on the polygons.
     """
-    readings, x, u, system, factor, gradient, step, row, turn, arm, spare = space[:11]
-    turned, shifted, places, heeded = space[11:]
+    readings, x, u, system, factor, gradient, step, _, _, _, spare, turned, shifted = space
     points, measured, _, _, _ = contacts
     count = len(faces)
-    found = NONE
-    amount = 2.0 * count
-    if heeding:
-        amount += len(known.corners) + len(known.starts)
-    for s in range(len(heeded)):
-        heeded[s] = False
+    on_hulls = False
     for share in SHARES:
-        last, ends, shorter = np.inf, False, 0
+        last = np.inf
         for _ in range(STEPS):
             carry(count, points, measured, rotation, translation, x, u)
             worst = read(count, faces, targets, x, u, model, contacts, readings)
             if worst <= 1.0 + EXACT:
-                found = max(found, POLYGONS)
+                on_hulls = True
                 if meets_all(count, faces, x, u, model, contacts, EXACT, spare):
-                    found = CONTACTS
-                    if not heeding:
-                        return WITNESS
-                    broken = breaks_known(
-                        faces, known, model, rotation, translation, heeded, places
-                    )
-                    if broken == UNBROKEN:
-                        return WITNESS
-                    if broken == ANEW:
-                        # More is asked for than before.
-                        last = np.inf
-                elif worst <= share:
+                    return True, True
+                if worst <= share:
                     break
             cost = exceeding(share, faces, contacts, model, space)
-            if heeding:
-                cost += hindering(
-                    *(share, faces, known, model, rotation, translation, heeded),
-                    ((system, gradient, row, turn, arm, spare), places),
-                )
             if cost < last:
-                ends, shorter = cost > STALLED * last, 0
                 last = cost
                 copy_pose(rotation, translation, turned, shifted)
                 least = 0.0
@@ -107,21 +74,14 @@ def seek_witness(faces, targets, contacts, model, known, heeding, rotation, tran
             else:
                 # Where other readings exceed at the step's end, less of it is better.
                 scale = 0.3
-                shorter += 1
-                ends = shorter == SHORTEST
-            if ends:
-                break
             for a in range(6):
                 step[a] *= scale
             move(turned, shifted, step, model[5], model[6], rotation, translation)
         if last < np.inf:
             copy_pose(turned, shifted, rotation, translation)
-            # A pose that meets all bounds exceeds no share of one by more than the rest of it.
-            if ends and last > 4.0 * amount * (1.0 - share) ** 2 + 0.1:
-                break
     carry(count, points, measured, rotation, translation, x, u)
     read(count, faces, targets, x, u, model, contacts, readings)
-    return found
+    return False, on_hulls
 
 
 @borrowing
@@ -131,7 +91,7 @@ def exceeding(share, faces, contacts, model, space):
     Returns:
         The sum.
     """
-    readings, x, u, system, _, gradient, _, row, turn, arm, spare = space[:11]
+    readings, x, u, system, _, gradient, _, row, turn, arm, spare, _, _ = space
     _, _, reaches, chords, sines = contacts
     gaps, lengths, _, _, kinds, misses, directions = readings
     centre, radius = model[5], model[6]

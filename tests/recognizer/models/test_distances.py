@@ -14,8 +14,8 @@ from oracles.geometry import signed_distances
 from palpate.recognizer import Polyhedron
 from palpate.recognizer.models.distance_kernels import deepest, signed_distance
 from palpate.recognizer.models.features import all_features, face_features
-from palpate.recognizer.poses.breach_kernels import move_inside
 from palpate.recognizer.poses.fits.pose import ModelTest
+from palpate.recognizer.poses.surroundings.breach_kernels import move_inside
 
 Floats = NDArray[np.float64]
 
@@ -201,6 +201,6 @@ def test_a_place_outside_is_not_taken_for_one_inside_that_has_to_leave() -> None
     ):
         place = CUBE.centroid.copy()
         place[2] = top + height
-        space = (*(np.empty(3) for _ in range(6)),)
-        assert move_inside(place, clearance, model, CUBE.face_count, space) == after
+        spaces = np.empty(3), np.empty(3), np.empty(3)
+        assert move_inside(place, clearance, model, CUBE.face_count, *spaces) == after
         assert (place[2] < top) == (after <= 0.0)

@@ -1,0 +1,1 @@
+"""Poses held against free space, a support and approaches."""
