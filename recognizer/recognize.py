@@ -13,7 +13,7 @@ from scipy.spatial.transform import RigidTransform
 
 from .belief import Belief
 from .beliefs.extent import pin_down
-from .beliefs.hypotheses import Hypothesis, PoseTolerance
+from .beliefs.hypotheses import Hypothesis, PoseTolerance, canonical
 from .beliefs.library import Library
 from .beliefs.outline import PlanarEntry, search_polygon, span_polygon
 from .beliefs.search import Search
@@ -243,7 +243,7 @@ class Recognizer:
             nulls[:] = [(h.interpretations < 0).sum(axis=1).min() for h in hypotheses]
         ranked = [
             hypotheses[index].ranked(float(weights[index]), back)
-            for index in np.lexsort((-weights, nulls))
+            for index in canonical(hypotheses, weights, nulls)
         ]
         if len(ranked) == 1 and ranked[0].determined and self.models:
             ranked = [self._pinned(ranked[0], contacts, known)]

@@ -32,8 +32,8 @@ def turn_chart(g, chart, turn, rotation):
     cayley(g, turn)
     for a in range(3):
         for b in range(3):
-            rotation[a, b] = turn[a, 0] * chart[0, b] + turn[a, 1] * chart[1, b]
-            rotation[a, b] += turn[a, 2] * chart[2, b]
+            rotation[a, b] = chart[a, 0] * turn[0, b] + chart[a, 1] * turn[1, b]
+            rotation[a, b] += chart[a, 2] * turn[2, b]
 
 
 @borrowing
@@ -58,9 +58,9 @@ def gibbs_between(first, second, g):
     for k in range(3):
         i, j = (k + 1) % 3, (k + 2) % 3
         g[k] = 0.0
-        # second first^T, its parts at (j, i) and (i, j).
+        # first^T second, its parts at (j, i) and (i, j).
         for b in range(3):
-            g[k] += second[j, b] * first[i, b] - second[i, b] * first[j, b]
+            g[k] += first[b, j] * second[b, i] - first[b, i] * second[b, j]
         g[k] /= 1.0 + trace
     return True
 
@@ -70,7 +70,7 @@ def recentre(chart, low, high, turn, half, middle):
     """A box of rotations about its own middle.
 
     Changing the centre is projective, so the images of the corners bound that of the box:
-    ``Cay(g) = Cay(g') Cay(c)`` with ``g' = (g - c - g x c) / (1 + g . c)``.
+    ``Cay(g) = Cay(c) Cay(g')`` with ``g' = (g - c + g x c) / (1 + g . c)``.
 
     Args:
         chart: (3, 3) world to object, of the Gibbs vector zero.
@@ -92,9 +92,9 @@ def recentre(chart, low, high, turn, half, middle):
         g1 = high[1] if corner & 2 else low[1]
         g2 = high[2] if corner & 4 else low[2]
         scale = 1.0 / (1.0 + g0 * c0 + g1 * c1 + g2 * c2)
-        e0 = scale * (g0 - c0 - (g1 * c2 - g2 * c1))
-        e1 = scale * (g1 - c1 - (g2 * c0 - g0 * c2))
-        e2 = scale * (g2 - c2 - (g0 * c1 - g1 * c0))
+        e0 = scale * (g0 - c0 + (g1 * c2 - g2 * c1))
+        e1 = scale * (g1 - c1 + (g2 * c0 - g0 * c2))
+        e2 = scale * (g2 - c2 + (g0 * c1 - g1 * c0))
         half[0], half[1], half[2] = (
             max(half[0], abs(e0)),
             max(half[1], abs(e1)),
@@ -105,6 +105,18 @@ def recentre(chart, low, high, turn, half, middle):
     for k in range(3):
         half[k] = 2.0 * half[k] * (1.0 + 1e-12)
     return 2.0 * np.arctan(np.sqrt(longest)) * (1.0 + 1e-12)
+
+
+@borrowing
+def turn_back(rotation, vectors, turned):
+    """Turn (n, 3) vectors by the inverse of a rotation, into (n, 3)."""
+    for i in range(len(vectors)):
+        for k in range(3):
+            turned[i, k] = (
+                rotation[0, k] * vectors[i, 0]
+                + rotation[1, k] * vectors[i, 1]
+                + rotation[2, k] * vectors[i, 2]
+            )
 
 
 @borrowing
@@ -121,7 +133,7 @@ def turn_all(rotation, vectors, turned):
 
 @borrowing
 def set_ways(arms, directions, half, angle, ways):
-    """The extent of each turned arm along each direction in a box, (n, d, 2) in place."""
+    """The extent of each arm along each turned direction in a box, (n, d, 2) in place."""
     for i in range(len(arms)):
         for k in range(len(directions)):
             least, most = extent(arms[i], directions[k], half, angle)

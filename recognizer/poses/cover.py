@@ -61,8 +61,9 @@ class Aims(NamedTuple):
     """Ways to assign what is left up to which they are tried one by one."""
     coarse: float
     """How far turns about a box's axis may move contacts, in radii, when features are tried."""
-    vague: bool
-    """Whether normals don't say where to begin."""
+    turns: int
+    """How many turns normals may leave open of the rotations in which features are tried: none, one
+    about an axis, or all three."""
     turn: float
     """Poses whose rotations are no farther apart than this, radians, ..."""
     shift: float
@@ -141,10 +142,10 @@ class Work(NamedTuple):
     """(3, 3) world to object: the middle of the box that was viewed last, ..."""
     half: Floats
     """(3,) ... half sides of the turns about it, ..."""
-    arms: Floats
-    """(n, 3) ... contacts about their mean, and ..."""
     facings: Floats
-    """(n, 3) ... normals, both turned by it, and ..."""
+    """(n, 3) ... normals turned by it, ..."""
+    directions: Floats
+    """(d, 3) ... the directions of slabs turned back by it, and ..."""
     ways: Floats
     """(n, d, 2) ... extents of the arms in the box."""
     hull: Floats
@@ -175,6 +176,10 @@ class Work(NamedTuple):
     """(3,) of the contacts, metres."""
     form: Floats
     vectors: Floats
+    charts: Floats
+    """(2, 3, 3) see `first_box_kernels.first_boxes`, and ..."""
+    sides: Floats
+    """... (2, 3) likewise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -302,8 +307,8 @@ def work_space(n: int, directions: int, mean: Floats) -> Work:
         other=empty((3, 3)),
         middle=empty((3, 3)),
         half=empty(3),
-        arms=empty((n, 3)),
         facings=empty((n, 3)),
+        directions=empty((directions, 3)),
         ways=empty((n, directions, 2)),
         hull=empty((directions, 2)),
         low=empty(6),
@@ -330,4 +335,6 @@ def work_space(n: int, directions: int, mean: Floats) -> Work:
         mean=mean.copy(),
         form=empty((4, 4)),
         vectors=empty((4, 4)),
+        charts=empty((2, 3, 3)),
+        sides=empty((2, 3)),
     )

@@ -8,12 +8,10 @@ one of its contacts is assigned each of its features, until all are (see `leaf_k
 
 from __future__ import annotations
 
-import numpy as np
-
 from ..compiling import borrowing, kernel
 from ..tree.mask_kernels import count_bits, pair_readings, take_lowest
 from .boxes_kernels import set_ways
-from .first_box_kernels import first_box
+from .first_box_kernels import ALL, IMPOSSIBLE, first_boxes
 from .leaf_kernels import (
     BY_PIECES,
     CUT,
@@ -39,8 +37,6 @@ from .node_kernels import (
 )
 from .shrink_kernels import tighten_turns
 
-WIDE = 1.2
-"""An angle (radians) of rotations above which normals say too little to start from."""
 LOOKS = 4
 """Times that features are dropped in one box."""
 FEWEST = 3
@@ -51,7 +47,7 @@ NARROWED = 0.9
 """... as long as less than this share of its longest side is left."""
 CHARTS = 4
 """Boxes of Gibbs vectors that together are all rotations: about none and half a turn each axis."""
-GONE, BRANCHES, BOXED, ASSIGNED = -1, 0, 1, 2
+GONE, BRANCHES, BOXED, ASSIGNED = -2, -1, 0, 1
 """No pose is left of a node; a contact is to be assigned; it has a box; all contacts are assigned
 in it."""
 
@@ -96,51 +92,40 @@ def take_child(top, stack, tables):
 
 
 @borrowing
-def branch(top, spare, stack):
+def branch(top, spare, stack, touches):
     """Have the contact with the fewest features be assigned each of them."""
-    stack.branching[top] = smallest(top, stack)
+    stack.branching[top] = smallest(top, stack, touches)
     stack.null_left[top] = stack.nulls[top] < spare
 
 
 @borrowing
-def place_box(top, problem, stack, work):
-    """Give a node without a box that of the rotations that its normals allow.
+def place_boxes(top, problem, stack, work):
+    """Give a node without a box those of the rotations that its normals allow.
 
     Returns:
-        `GONE`; `BRANCHES` if more contacts have to be assigned first; `BOXED`; `ASSIGNED` if all
-        are and still leave all rotations.
+        How many nodes are in its place then, each with a box; none if no rotation is left, and
+        `BRANCHES` if more contacts have to be assigned first.
     """
     aims = problem.aims
-    assigned, still, ways = count_open(top, stack)
-    angle = np.pi
-    if assigned >= 2 and not aims.vague:
-        angle = first_box(
-            *(stack.fixed[top], problem.shape, problem.touches, work.form, work.vectors),
-            *(stack.charts[top], stack.highs[top]),
-        )
-        if angle < 0.0:
-            return GONE
-    if still > 0 and not aims.vague and (angle > WIDE or ways <= aims.crowd):
+    _, still, ways = count_open(top, stack)
+    turns = first_boxes(stack.fixed[top], problem.shape, problem.touches, work)
+    if turns == IMPOSSIBLE:
+        return 0
+    if still > 0 and (turns > aims.turns or (aims.turns == 0 and ways <= aims.crowd)):
         return BRANCHES
-    if angle > WIDE:
-        return ASSIGNED
-    for a in range(3):
-        stack.lows[top, a] = -stack.highs[top, a]
-    return BOXED
-
-
-@borrowing
-def chart(top, stack):
-    """Put nodes with all rotations, in four boxes, into a node's place and the next three."""
-    for turn in range(CHARTS):
-        if turn + 1 < CHARTS:
-            copy_node(top + turn, top + turn + 1, stack)
+    boxes = CHARTS if turns == ALL else turns + 1
+    for at in range(boxes):
+        if at + 1 < boxes:
+            copy_node(top + at, top + at + 1, stack)
         for a in range(3):
+            side = 1.0 if turns == ALL else work.sides[at, a]
+            stack.lows[top + at, a], stack.highs[top + at, a] = -side, side
             for b in range(3):
-                stack.charts[top + turn, a, b] = 0.0
-            stack.charts[top + turn, a, a] = 1.0 if turn in (0, a + 1) else -1.0
-            stack.lows[top + turn, a], stack.highs[top + turn, a] = -1.0, 1.0
-        stack.boxed[top + turn] = True
+                stack.charts[top + at, a, b] = 0.0 if turns == ALL else work.charts[at, a, b]
+            if turns == ALL:
+                stack.charts[top + at, a, a] = 1.0 if at in (0, a + 1) else -1.0
+        stack.boxed[top + at] = turns > 0
+    return boxes
 
 
 @borrowing
@@ -153,8 +138,8 @@ def narrow_node(top, problem, stack, work):
     shape, touches, aims = problem.shape, problem.touches, problem.aims
     still, ways = 0, 1.0
     for _ in range(REPEATS):
-        angle = view(top, stack, touches, work)
-        set_ways(work.arms, shape.directions, work.half, angle, work.ways)
+        angle = view(top, stack, shape, touches, work)
+        set_ways(touches.arms, work.directions, work.half, angle, work.ways)
         for _look in range(LOOKS):
             changed = narrow_in_box(top, angle, aims.spare, stack, shape, touches, work)
             if changed < 0 or not settle_singles(top, stack, problem.tables, aims.spare):
@@ -201,15 +186,12 @@ def step(top, found, problem, stack, leaves, counts, work):
     if not settle_singles(top, stack, problem.tables, aims.spare):
         return 0, False
     if not stack.boxed[top]:
-        outcome = place_box(top, problem, stack, work)
-        if outcome == GONE:
-            return 0, False
-        if outcome == BRANCHES:
-            branch(top, aims.spare, stack)
+        boxes = place_boxes(top, problem, stack, work)
+        if boxes == BRANCHES:
+            branch(top, aims.spare, stack, problem.touches)
             return 1, False
-        if outcome == ASSIGNED:
-            chart(top, stack)
-            return CHARTS, False
+        if boxes != 1:
+            return boxes, False
     outcome = narrow_node(top, problem, stack, work)
     if outcome == GONE:
         return 0, False
@@ -222,10 +204,10 @@ def step(top, found, problem, stack, leaves, counts, work):
             return pieces, False
         if leaf != CUT_UP:
             return 0, leaf == LEAF
-    view(top, stack, problem.touches, work)
-    axis, far = widest(top, stack, work)
+    view(top, stack, problem.shape, problem.touches, work)
+    axis, far = widest(top, stack, problem.touches, work)
     if outcome != ASSIGNED and (outcome == BRANCHES or far <= aims.coarse):
-        branch(top, aims.spare, stack)
+        branch(top, aims.spare, stack, problem.touches)
         return 1, False
     split(top, axis, stack)
     return 2, False

@@ -1,8 +1,9 @@
-"""Compiled first box: the rotation that fits the normals best, and how far off any can be.
+"""Compiled first boxes: the rotations that the normals of assigned contacts leave.
 
 Davenport's q-method: the sum of ``|Q u - n|^2``, each over its squared bound, is a quadratic form
 in the quaternion of ``Q``, so its least is at an eigenvector, and a rotation whose sum is within
-what the bounds allow is within an ellipsoid about it.
+what the bounds allow is in an ellipsoid of quaternions about it. If that is long in one direction
+only, the normals leave a turn about an axis; two boxes hold it, about its best and half a turn on.
 """
 
 from __future__ import annotations
@@ -12,24 +13,75 @@ import numpy as np
 from ..compiling import borrowing
 from .motions.align_kernels import ROUNDING, diagonalise, rotation_of
 
+WIDE = 0.32
+"""Squared sine of half an angle: the normals leave a turn about an axis open if they allow more."""
+IMPOSSIBLE, ALL = -1, 3
+"""Of turns that are open: no rotation is within the bounds; all are."""
+
 
 @borrowing
-def first_box(fixed, shape, touches, form, vectors, chart, half):
-    """The rotation that fits the normals of assigned contacts best, and a box about it.
+def box_about(best, open_turn, slack, form, vectors, chart, half):
+    """A box about a quaternion that holds those whose part along it is not small.
+
+    Args:
+        best: the column of the quaternion.
+        open_turn: the column of one along which the part may be as large; below zero for none.
+        slack: how much more than the least the sum of misfits may be.
+        form: (4, 4) diagonal.
+        vectors: (4, 4) its eigenvectors, as columns.
+        chart: (3, 3) rotation of the quaternion, written in place.
+        half: (3,) half sides of a box of Gibbs vectors about it, likewise.
+    """
+    w, x, y, z = vectors[0, best], vectors[1, best], vectors[2, best], vectors[3, best]
+    rotation_of(w, x, y, z, chart)
+    top = form[best, best]
+    if open_turn >= 0:
+        top = max(top, form[open_turn, open_turn])
+    longest = 0.0
+    for k in range(4):
+        if k not in (best, open_turn):
+            longest = max(longest, slack / (2.0 * (top - form[k, k])))
+    # At least so much of the square is along the quaternion, where nothing is open, or its part is
+    # no less than the other one's.
+    least = (1.0 - longest) * (0.5 if open_turn >= 0 else 1.0)
+    for k in range(3):
+        half[k] = 0.0
+    turn = (0.0, 0.0, 0.0)
+    for k in range(4):
+        if k == best:
+            continue
+        # The vector part of the conjugate of the quaternion times this one.
+        q0, q1, q2, q3 = vectors[0, k], vectors[1, k], vectors[2, k], vectors[3, k]
+        v0 = w * q1 - q0 * x - (y * q3 - z * q2)
+        v1 = w * q2 - q0 * y - (z * q1 - x * q3)
+        v2 = w * q3 - q0 * z - (x * q2 - y * q1)
+        if k == open_turn:
+            turn = (abs(v0), abs(v1), abs(v2))
+            continue
+        reach = slack / (2.0 * (top - form[k, k]) * least)
+        half[0] += reach * v0 * v0
+        half[1] += reach * v1 * v1
+        half[2] += reach * v2 * v2
+    for k in range(3):
+        half[k] = (1.0 + 1e-6) * (np.sqrt(half[k]) + turn[k]) + 1e-7
+
+
+@borrowing
+def first_boxes(fixed, shape, touches, work):
+    """The rotations that the normals of assigned contacts leave, in one box or two.
 
     Args:
         fixed: (n,) the feature of each contact, below zero for none.
         shape: see `shape.Shape`.
         touches: see `shape.Touches`.
-        form: (4, 4) work space.
-        vectors: (4, 4) likewise.
-        chart: (3, 3) world to object, written in place.
-        half: (3,) half sides of a box of Gibbs vectors about it, written in place.
+        work: see `cover.Work`; ``charts`` and ``sides`` are written in place: rotations, world to
+            object, and half sides of boxes of Gibbs vectors about them.
 
     Returns:
-        An angle that no rotation within the bounds exceeds from it, radians; pi if the normals
-        don't fix the rotation, -1 if no rotation is within the bounds.
+        How many turns are open: none, and one box holds the rotations; one, and two do; `ALL`, and
+        none is written; or `IMPOSSIBLE`.
     """
+    form, vectors = work.form, work.vectors
     for a in range(4):
         for b in range(4):
             form[a, b] = 0.0
@@ -55,8 +107,8 @@ def first_box(fixed, shape, touches, form, vectors, chart, half):
             for b in range(a, 3):
                 form[1 + a, 1 + b] += weight * (n[a] * u[b] + n[b] * u[a])
             form[1 + a, 1 + a] -= weight * along
-    if budget < 2.0:
-        return np.pi
+    if budget == 0.0:
+        return ALL
     for a in range(4):
         for b in range(a):
             form[a, b] = form[b, a]
@@ -68,32 +120,15 @@ def first_box(fixed, shape, touches, form, vectors, chart, half):
     # The sum is 2 total - 2 q^T K q.
     slack = budget - 2.0 * (total - form[best, best]) + ROUNDING
     if slack < 0.0:
-        return -1.0
-    longest = 0.0
+        return IMPOSSIBLE
+    turns, along = 0, -1
     for k in range(4):
-        if k != best:
-            # A unit quaternion's part along this one, squared, is at most so much.
-            gap = 2.0 * (form[best, best] - form[k, k])
-            if gap <= slack:
-                return np.pi
-            longest = max(longest, slack / gap)
-    w, x, y, z = vectors[0, best], vectors[1, best], vectors[2, best], vectors[3, best]
-    rotation_of(w, x, y, z, chart)
-    for k in range(3):
-        half[k] = 0.0
-    for k in range(4):
-        if k == best:
-            continue
-        reach = slack / (2.0 * (form[best, best] - form[k, k]))
-        # The quaternion of a turn after the best: the vector part of q times its conjugate.
-        q0, q1, q2, q3 = vectors[0, k], vectors[1, k], vectors[2, k], vectors[3, k]
-        v0 = w * q1 - q0 * x - (q2 * z - q3 * y)
-        v1 = w * q2 - q0 * y - (q3 * x - q1 * z)
-        v2 = w * q3 - q0 * z - (q1 * y - q2 * x)
-        half[0] += reach * v0 * v0
-        half[1] += reach * v1 * v1
-        half[2] += reach * v2 * v2
-    scale = (1.0 + 1e-6) / np.sqrt(1.0 - longest)
-    for k in range(3):
-        half[k] = scale * np.sqrt(half[k]) + 1e-7
-    return min(np.pi, 2.0 * np.arcsin(np.sqrt(longest)) + 1e-6)
+        if k != best and 2.0 * WIDE * (form[best, best] - form[k, k]) < slack:
+            turns += 1
+            along = k
+    if turns > 1:
+        return ALL
+    box_about(best, along, slack, form, vectors, work.charts[0], work.sides[0])
+    if turns == 1:
+        box_about(along, best, slack, form, vectors, work.charts[1], work.sides[1])
+    return turns

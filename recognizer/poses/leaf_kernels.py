@@ -52,7 +52,7 @@ def coarseness(top, stack, touches, work):
     for j in range(len(touches.arms)):
         if stack.fixed[top, j] < 0:
             continue
-        a = work.arms[j]
+        a = touches.arms[j]
         length = np.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
         worst = max(worst, 0.5 * square * length / touches.reaches[j])
         if touches.errors[j] < 0.5 * np.pi:
@@ -233,7 +233,7 @@ def settle_leaf(top, at, problem, stack, leaves, counts, work):
     work.cut_count[0] = 0
     on_polygons, met, tries, coarse = False, False, 0, np.inf
     for turn in range(2 * ROUNDS):
-        view(top, stack, touches, work)
+        view(top, stack, shape, touches, work)
         set_box(top, stack, work)
         used = cut_rows(touches, rows_of(top, stack, shape, touches, work), work)
         share = tighten(0, 6, used, work)
@@ -253,10 +253,10 @@ def settle_leaf(top, at, problem, stack, leaves, counts, work):
             copy_pose(work.best, work.shift, work.rotation, work.translation)
             emit(top, True, at, stack, leaves, work)
             return LEAF
-        if not handy:
-            return CUT_UP
         if on_polygons and on_pieces(top, stack, shape) >= 0:
             return BY_PIECES
+        if not handy:
+            return CUT_UP
         tries += 1
         if tries > 1 and coarse > FINEST and share > STUCK:
             break

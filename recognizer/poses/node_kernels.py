@@ -10,7 +10,7 @@ import numpy as np
 
 from ..compiling import borrowing
 from ..tree.mask_kernels import bit_index, narrow
-from .boxes_kernels import facing, fits_room, recentre, turn_all
+from .boxes_kernels import facing, fits_room, recentre, turn_all, turn_back
 
 OPEN, NONE = -1, -2
 """Of a contact's feature: not chosen yet; it is on none."""
@@ -20,6 +20,10 @@ LEAST_ARM = 0.1
 """An arm, in radii, by which turns count even where they move no contact: they turn normals."""
 ELSEWHERE = 0.05
 """The square of a Gibbs vector from which on the axes about it are others than those about zero."""
+UNKNOWN = 1.6
+"""A bound on a normal (radians) from which on it says little: half a sphere or more."""
+BEHIND = 1e6
+"""More features than any contact has."""
 _ONE = np.uint64(1)
 _EMPTY = np.uint64(0)
 
@@ -146,13 +150,13 @@ def narrow_in_box(top, angle, spare, stack, shape, touches, work):
 
 
 @borrowing
-def view(top, stack, touches, work):
-    """Turn the contacts into the middle of a node's box; returns the largest turn in it."""
+def view(top, stack, shape, touches, work):
+    """See contacts and features from the middle of a node's box; returns its largest turn."""
     angle = recentre(
         stack.charts[top], stack.lows[top], stack.highs[top], work.turn, work.half, work.middle
     )
-    turn_all(work.middle, touches.arms, work.arms)
     turn_all(work.middle, touches.normals, work.facings)
+    turn_back(work.middle, shape.directions, work.directions)
     return angle
 
 
@@ -171,12 +175,20 @@ def count_open(top, stack):
 
 
 @borrowing
-def smallest(top, stack):
-    """The open contact with the fewest features; the first of them."""
-    best, least = -1, 1 << 30
+def smallest(top, stack, touches):
+    """The open contact with the fewest features; the first of them.
+
+    Of nodes without a box one whose normal is known comes first: it is what leads to a box.
+    """
+    best, least = -1, np.inf
     for j in range(stack.fixed.shape[1]):
-        if stack.fixed[top, j] == OPEN and stack.sizes[top, j] < least:
-            best, least = j, stack.sizes[top, j]
+        if stack.fixed[top, j] != OPEN:
+            continue
+        ways = 1.0 * stack.sizes[top, j]
+        if not stack.boxed[top] and touches.errors[j] > UNKNOWN:
+            ways *= BEHIND
+        if ways < least:
+            best, least = j, ways
     return best
 
 
@@ -218,21 +230,21 @@ def split(top, axis, stack):
 
 
 @borrowing
-def widest(top, stack, work):
+def widest(top, stack, touches, work):
     """The axis across which to cut a box, and how far turns about its axes move contacts, in radii.
 
     It is the one whose turns move them most; of wide boxes, whose own axes are elsewhere, the
     longest.
     """
     best, far = 0, -1.0
-    n = len(work.arms)
+    n = len(touches.arms)
     longest, widths = 0, stack.highs[top]
     for k in range(3):
         if widths[k] - stack.lows[top, k] > widths[longest] - stack.lows[top, longest]:
             longest = k
         square = 0.0
         for j in range(n):
-            a = work.arms[j]
+            a = touches.arms[j]
             square += a[0] * a[0] + a[1] * a[1] + a[2] * a[2] - a[k] * a[k]
         moved = work.half[k] * np.sqrt(square / n + LEAST_ARM * LEAST_ARM)
         if moved > far:

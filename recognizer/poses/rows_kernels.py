@@ -3,9 +3,11 @@
 A pose is ``Q``, world to object, and a shift ``s``, so that a point ``p`` (about the contacts'
 mean) is at ``Q p + s`` in the object's frame. A box is a middle rotation, and about it the turns
 ``Cay(w / 2)`` with ``|w_k| <= half_k`` (Cayley's map: twice the Gibbs vector is about a rotation
-vector), and shifts within limits. Whatever is asked is of the form ``m . (Q a + s) <= limit``; with
-``a`` turned by the middle rotation it is ``m . a + w . (a x m) + r + m . s <= limit``, where ``r``
-is what linearising leaves out, and the row gives up the least that ``r`` can be in the box.
+vector), and shifts within limits. Turns come before the middle, ``Q = Q_mid Cay(w / 2)``, so that
+a box is along the axes of the world, where the contacts are. Whatever is asked is of the form
+``m . (Q a + s) <= limit``; with ``n``, which is ``m`` turned back by the middle, it is
+``n . a + w . (a x n) + r + m . s <= limit``, where ``r`` is what linearising leaves out, and the
+row gives up the least that ``r`` can be in the box.
 """
 
 from __future__ import annotations
@@ -27,8 +29,8 @@ def remainder(a, m, half):
     quadratic is ``sum_k w_k^2 (a_k m_k - a . m) + sum_{i < k} w_i w_k (a_i m_k + a_k m_i)``.
 
     Args:
-        a: (3,) turned by the middle rotation.
-        m: (3,) direction.
+        a: (3,)
+        m: (3,) direction, turned back by the middle rotation.
         half: (3,) half sides of the box.
     """
     h0, h1, h2 = half[0], half[1], half[2]
@@ -51,8 +53,8 @@ def extent(a, m, half, angle):
     """The least and the most of ``m . Q a`` over the rotations of a box.
 
     Args:
-        a: (3,) turned by the middle rotation.
-        m: (3,) unit direction.
+        a: (3,)
+        m: (3,) unit direction, turned back by the middle rotation.
         half: (3,) half sides of the box.
         angle: the largest of its turns, radians.
     """
@@ -73,16 +75,20 @@ def extent(a, m, half, angle):
 
 
 @borrowing
-def add_row(a, m, moves, limit, half, low, high, columns, used):
+def add_row(a, m, moves, limit, work, used):
     """Ask that ``m . (Q a + s)``, without ``s`` if nothing moves, is at most ``limit``.
 
-    Left out if the box implies it.
+    Left out if the box (``middle``, ``half``, ``low`` and ``high`` of `cover.Work`) implies it.
 
     Returns:
         How many rows there are then.
     """
-    c0, c1, c2 = a[1] * m[2] - a[2] * m[1], a[2] * m[0] - a[0] * m[2], a[0] * m[1] - a[1] * m[0]
-    along = a[0] * m[0] + a[1] * m[1] + a[2] * m[2]
+    low, high, columns, q = work.low, work.high, work.columns, work.middle
+    n0 = q[0, 0] * m[0] + q[1, 0] * m[1] + q[2, 0] * m[2]
+    n1 = q[0, 1] * m[0] + q[1, 1] * m[1] + q[2, 1] * m[2]
+    n2 = q[0, 2] * m[0] + q[1, 2] * m[1] + q[2, 2] * m[2]
+    c0, c1, c2 = a[1] * n2 - a[2] * n1, a[2] * n0 - a[0] * n2, a[0] * n1 - a[1] * n0
+    along = a[0] * n0 + a[1] * n1 + a[2] * n2
     most = max(c0 * low[0], c0 * high[0]) + max(c1 * low[1], c1 * high[1])
     most += max(c2 * low[2], c2 * high[2])
     if moves:
@@ -91,7 +97,7 @@ def add_row(a, m, moves, limit, half, low, high, columns, used):
     room = limit - along + ROUNDING
     if most <= room or used == columns.shape[1]:
         return used
-    least, _ = remainder(a, m, half)
+    least, _ = remainder(a, (n0, n1, n2), work.half)
     room -= least
     if most <= room:
         return used
@@ -103,9 +109,7 @@ def add_row(a, m, moves, limit, half, low, high, columns, used):
 
 
 @borrowing
-def contact_rows(
-    arm, normal, reach, error, feature, polygon, shape, half, low, high, columns, used
-):
+def contact_rows(i, feature, polygon, shape, touches, work, used):
     """What one contact on a feature asks of the poses in a box.
 
     Its place is within its bound of the polygon, so of each half-space that holds the polygon. Its
@@ -113,34 +117,29 @@ def contact_rows(
     across it; of an edge's or a vertex's cone, which is within its half angle of its middle.
 
     Args:
-        arm: (3,) its place about the contacts' mean, turned by the box's middle rotation.
-        normal: (3,) measured, likewise.
-        reach: bound on the place.
-        error: bound on the normal, radians.
+        i: the contact.
         feature: what it is on.
         polygon: the polygon that stands for it.
         shape: see `shape.Shape`.
-        half: (3,) half sides of the box's turns.
-        low: (6,) the box: turns, then shifts.
-        high: (6,) likewise.
-        columns: (7, m) of each row its six numbers and its limit, written in place.
-        used: how many there are.
+        touches: see `shape.Touches`.
+        work: see `cover.Work`: the box, and ``columns``, written in place.
+        used: how many rows there are.
 
     Returns:
         How many there are then; what finds no room is left out.
     """
+    arm, normal = touches.arms[i], touches.normals[i]
+    reach, error = touches.reaches[i], touches.errors[i]
     for side in range(shape.side_start[polygon], shape.side_start[polygon + 1]):
-        used = add_row(
-            arm, shape.sides[side], True, shape.limits[side] + reach, half, low, high, columns, used
-        )
+        used = add_row(arm, shape.sides[side], True, shape.limits[side] + reach, work, used)
     wide = error + shape.half_angles[feature]
     if wide < np.pi:
         m = shape.normals[feature]
         # The other way round, so that all rows are bounds from above.
         back = (-m[0], -m[1], -m[2])
-        used = add_row(normal, back, False, -np.cos(wide), half, low, high, columns, used)
+        used = add_row(normal, back, False, -np.cos(wide), work, used)
     if error < 0.5 * np.pi:
         sine = np.sin(error)
         for k in range(shape.cone_start[feature], shape.cone_start[feature + 1]):
-            used = add_row(normal, shape.cone_sides[k], False, sine, half, low, high, columns, used)
+            used = add_row(normal, shape.cone_sides[k], False, sine, work, used)
     return used

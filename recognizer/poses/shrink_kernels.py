@@ -31,20 +31,7 @@ def rows_of(top, stack, shape, touches, work):
     for j in range(len(touches.arms)):
         f = stack.fixed[top, j]
         if f >= 0:
-            used = contact_rows(
-                work.arms[j],
-                work.facings[j],
-                touches.reaches[j],
-                touches.errors[j],
-                f,
-                stack.targets[top, j],
-                shape,
-                work.half,
-                work.low,
-                work.high,
-                work.columns,
-                used,
-            )
+            used = contact_rows(j, f, stack.targets[top, j], shape, touches, work, used)
     return used
 
 
@@ -53,17 +40,8 @@ def cut_rows(touches, used, work):
     """The rows of cuts, behind ``used`` others; returns how many there are then."""
     for c in range(work.cut_count[0]):
         i = work.cut_of[c]
-        used = add_row(
-            work.arms[i],
-            work.cuts[c],
-            True,
-            work.cuts[c, 3] + touches.reaches[i],
-            work.half,
-            work.low,
-            work.high,
-            work.columns,
-            used,
-        )
+        limit = work.cuts[c, 3] + touches.reaches[i]
+        used = add_row(touches.arms[i], work.cuts[c], True, limit, work, used)
     return used
 
 

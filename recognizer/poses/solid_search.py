@@ -25,6 +25,8 @@ COARSE, COARSEST = 5.0, 0.1
 """How far turns about a box's axis may move contacts when their features are tried: in bounds on
 positions, and at least so many radii. Features of wider boxes are mostly left by what rules out
 nothing."""
+FEW = 3
+"""Contacts up to which, this not included, features are chosen before rotations."""
 ROUNDING = 1e-12
 """Of a cosine."""
 
@@ -108,13 +110,14 @@ def _domains(entry: SolidEntry, contacts: Contacts, known: NDArray[np.int32] | N
 
 def _find(entry: SolidEntry, contacts: Contacts, aim: Aim, domains: Bits) -> Found:
     """The same where nothing else is known, with the features that each contact may be on."""
+    upright, contacts = _upright(contacts)
     shape, model = entry.shape, entry.test.model
     largest = float(contacts.position_error.max()) / shape.radius
     aims = Aims(
         spare=aim.outliers,
         crowd=float(aim.limits.crowd),
         coarse=max(COARSE * largest, COARSEST),
-        vague=_vague(contacts),
+        turns=_open_turns(contacts),
         turn=aim.turn,
         shift=aim.shift / shape.radius,
     )
@@ -124,10 +127,17 @@ def _find(entry: SolidEntry, contacts: Contacts, aim: Aim, domains: Bits) -> Fou
     )
     leaves = cover.leaves
     labels, count = link_leaves(leaves, cover.interpretations)
-    poses = report_components(
-        *(leaves, labels, count, problem.contacts, model, problem.touches.mean, shape.radius)
+    poses = Poses(
+        *report_components(
+            *(leaves, labels, count, problem.contacts, model, problem.touches.mean, shape.radius)
+        )
     )
-    return Found(Poses(*poses), cover.nodes, cover.tried, cover.complete)
+    poses = replace(
+        poses,
+        rotations=np.ascontiguousarray(upright.T @ poses.rotations),
+        translations=np.ascontiguousarray(poses.translations @ upright),
+    )
+    return Found(poses, cover.nodes, cover.tried, cover.complete)
 
 
 def _find_standing(
@@ -173,17 +183,48 @@ def _find_standing(
     )
 
 
-def _vague(contacts: Contacts) -> bool:
-    """Whether the known normals leave the rotation open: fewer than two, or maybe all parallel."""
-    rows = zip(contacts.normals, contacts.normal_error.tolist(), strict=True)
-    known = ((normal, error) for normal, error in rows if error < math.pi / 2.0)
-    first, first_error = next(known, (None, 0.0))
-    # If none surely leans away from the first, two others are about as parallel. Contacts come in
-    # an order that has those that lean most first, so mostly the second says it.
-    return first is None or all(
-        abs(first @ normal) >= math.cos(min(first_error + error, math.pi / 2.0)) - ROUNDING
-        for normal, error in known
+def _upright(contacts: Contacts) -> tuple[Floats, Contacts]:
+    """A rotation (3, 3) that brings what normals have in common upright, and contacts turned by it.
+
+    Where they leave a turn about it open, boxes are then along that turn.
+    """
+    known = contacts.normal_error < math.pi / 2.0
+    axis = np.array([0.0, 0.0, 1.0])
+    if known.any():
+        normals, errors = contacts.normals[known], contacts.normal_error[known]
+        surest = normals[errors.argmin()]
+        weights = np.where(normals @ surest < 0.0, -1.0, 1.0) / errors**2
+        axis = weights @ normals
+        axis /= np.linalg.norm(axis)
+    one = np.cross(axis, np.eye(3)[np.abs(axis).argmin()])
+    one /= np.linalg.norm(one)
+    turn = np.array([one, np.cross(axis, one), axis])
+    return turn, Contacts.trusted(
+        np.ascontiguousarray(contacts.positions @ turn.T),
+        np.ascontiguousarray(contacts.normals @ turn.T),
+        position_error=contacts.position_error,
+        normal_error=contacts.normal_error,
+        approaches=contacts.approaches,
+        kinds=contacts.kinds,
     )
+
+
+def _open_turns(contacts: Contacts) -> int:
+    """How many turns normals may leave open of the rotations in which features are tried.
+
+    None where all normals are known, or two lean apart: what a contact is on says more of a pose
+    than a rotation, and what leaves a family of poses is told as it is. All three where no normal
+    is known, and one, about an axis, where those that are may all be parallel.
+    """
+    known = contacts.normal_error < math.pi / 2.0
+    if known.all() or len(contacts) < FEW:
+        return 0
+    if not known.any():
+        return 3
+    normals, errors = contacts.normals[known], contacts.normal_error[known]
+    # If none surely leans away from the first, two others are about as parallel.
+    leans = np.cos(np.minimum(errors[0] + errors, math.pi / 2.0)) - ROUNDING
+    return int((np.abs(normals @ normals[0])[1:] >= leans[1:]).all())
 
 
 def _spread_over_symmetries(

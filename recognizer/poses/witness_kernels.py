@@ -21,6 +21,10 @@ SMALL = 1e-9
 """Damping, as a share of the stiffness: along what no reading bears on the pose stays."""
 EXACT = 1e-9
 """By how much a witness may exceed a bound, as a share of it: rounding."""
+STALLED = 0.999
+"""A share of what is exceeded; if more is left after a step, more of them are in vain."""
+SHORTEST = 3
+"""Times that a step is shortened before it is given up."""
 LONGEST = 0.5
 """The longest step, in radii: the linear picture holds for a fraction of a radian only."""
 
@@ -47,7 +51,7 @@ def seek_witness(faces, targets, contacts, model, rotation, translation, space):
     count = len(faces)
     on_hulls = False
     for share in SHARES:
-        last = np.inf
+        last, ends, shorter = np.inf, False, 0
         for _ in range(STEPS):
             carry(count, points, measured, rotation, translation, x, u)
             worst = read(count, faces, targets, x, u, model, contacts, readings)
@@ -59,6 +63,7 @@ def seek_witness(faces, targets, contacts, model, rotation, translation, space):
                     break
             cost = exceeding(share, faces, contacts, model, space)
             if cost < last:
+                ends, shorter = cost > STALLED * last, 0
                 last = cost
                 copy_pose(rotation, translation, turned, shifted)
                 least = 0.0
@@ -74,11 +79,18 @@ def seek_witness(faces, targets, contacts, model, rotation, translation, space):
             else:
                 # Where other readings exceed at the step's end, less of it is better.
                 scale = 0.3
+                shorter += 1
+                ends = shorter == SHORTEST
+            if ends:
+                break
             for a in range(6):
                 step[a] *= scale
             move(turned, shifted, step, model[5], model[6], rotation, translation)
         if last < np.inf:
             copy_pose(turned, shifted, rotation, translation)
+            # A pose that meets all bounds exceeds no share of one by more than the rest of it.
+            if ends and last > 8.0 * count * (1.0 - share) ** 2 + 0.1:
+                break
     carry(count, points, measured, rotation, translation, x, u)
     read(count, faces, targets, x, u, model, contacts, readings)
     return False, on_hulls

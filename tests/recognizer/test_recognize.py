@@ -51,7 +51,7 @@ def assert_consistent(belief: Belief, contacts: Contacts, names: tuple[str, ...]
     """What holds for every belief, whatever was touched."""
     weights = np.array([hypothesis.weight for hypothesis in belief.hypotheses])
     assert (weights >= 0.0).all()
-    assert (np.diff(weights) <= 0.0).all()
+    assert (np.diff(weights) <= 1e-3 * weights[:-1]).all()  # they are rounded to be put in order
     assert belief.empty == (len(weights) == 0)
     assert belief.empty or weights.sum() == pytest.approx(1.0)
     assert tuple(search.object_name for search in belief.searches) == names
@@ -146,12 +146,17 @@ def test_moving_the_world_moves_the_belief(recognizer: Recognizer) -> None:
         before = recognizer.recognize(contacts)
         after = recognizer.recognize(move(motion, contacts))
         assert len(before.hypotheses) == len(after.hypotheses)
-        for one, other in zip(before.hypotheses, after.hypotheses, strict=True):
-            assert one.object_name == other.object_name
+        left = list(after.hypotheses)
+        for one in before.hypotheses:
+            # Those of like weight are put in order by their poses, which a motion changes.
+            owner = model_called(recognizer, one.object_name)
+            alike = [other for other in left if other.object_name == owner.name]
+            moved = motion * one.pose
+            other = min(alike, key=lambda other: sum(errors(owner, other.pose, moved)))
+            left.remove(other)
             assert other.weight == pytest.approx(one.weight, abs=1e-4)
             if one.determined:
-                owner = model_called(recognizer, one.object_name)
-                shift, turn = errors(owner, other.pose, motion * one.pose)
+                shift, turn = errors(owner, other.pose, moved)
                 assert shift < 1e-5
                 assert turn < 1e-4
 

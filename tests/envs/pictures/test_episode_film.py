@@ -46,9 +46,11 @@ def record_of(**arguments) -> EpisodeRecord:
 
 @pytest.fixture(scope="module")
 def record() -> EpisodeRecord:
-    """Two probes: the first leaves a hundred hypotheses, the second one."""
+    """Two probes: the first leaves about a hundred hypotheses, the second one."""
     made = record_of()
-    assert [len(probed.belief.hypotheses) for probed in made.probes if probed.belief] == [102, 1]
+    first, second = (len(probed.belief) for probed in made.probes if probed.belief)
+    assert 50 < first < 200
+    assert second == 1
     return made
 
 
@@ -168,11 +170,12 @@ def test_rivals_that_a_probe_rules_out_fade_and_stay_away(shots, record):
     assert f"ruled out: {leaders[0].object_name}" in names
 
 
-def test_captions_tell_what_is_left(shots):
+def test_captions_tell_what_is_left(record, shots):
     told = list(dict.fromkeys((shot.caption.title, shot.caption.subtitle) for shot in shots))
     assert [title for title, _ in told[1:-1]] == ["Probe 1 of 2"] * 2 + ["Probe 2 of 2"] * 2
     assert told[1][1] == "Nothing touched yet"
-    assert told[2][1].startswith("102 hypotheses left: ")
+    left = len(record.probes[0].belief)
+    assert told[2][1].startswith(f"{left} hypotheses left: ")
     assert told[2][1] == told[3][1]
     assert told[4][1].startswith("1 hypothesis left: complex-hand")
 

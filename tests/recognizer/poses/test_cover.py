@@ -49,8 +49,8 @@ def cover_of(
 ) -> Cover:
     """The cover of all poses, over all features or those of one interpretation."""
     largest = float(contacts.position_error.max()) / entry.shape.radius
-    vague = bool((contacts.normal_error > 1.0).all())
-    aims = Aims(spare, 1.0, max(5.0 * largest, 0.1), vague, 0.05, max(0.02, 2.0 * largest))
+    turns = 3 if (contacts.normal_error > 1.0).all() else 0
+    aims = Aims(spare, 1.0, max(5.0 * largest, 0.1), turns, 0.05, max(0.02, 2.0 * largest))
     problem = problem_of(
         entry.shape, entry.test.model, entry.packed, contacts, Constraints().bits, aims
     )
@@ -64,7 +64,7 @@ def holding(leaves: Leaves, contacts: Contacts, radius: float, pose: RigidTransf
     """The leaves whose boxes a pose is in, worked out from what a box is."""
     inverse = pose.rotation.inv()
     shift = inverse.apply(contacts.positions.mean(axis=0) - pose.translation) / radius
-    turns = inverse * Rotation.from_matrix(leaves.charts).inv()
+    turns = Rotation.from_matrix(leaves.charts).inv() * inverse
     angles = np.maximum(turns.magnitude(), 1e-300)[:, None]
     gibbs = np.tan(angles / 2.0) * turns.as_rotvec() / angles
     inside = (leaves.lows - ROUNDING <= gibbs) & (gibbs <= leaves.highs + ROUNDING)
