@@ -5,10 +5,16 @@ from __future__ import annotations
 import numpy as np
 
 from ..compiling import borrowing
-from .polygon_kernels import nearest_in_polygon
+from .polygon_kernels import CORNER, foot_in_polygon
 
 STRIDE = 64
 """Inside the object a path is looked at once in so small a share of its length at least."""
+
+TIE = 1e-9
+"""A share of squared distances by which those to one point of the surface may differ: rounding."""
+GRAZING = 1e-3
+"""Sines of slopes below which a face's plane doesn't say on which side of the surface a point is;
+nor does one that has but a corner nearest. All faces together do."""
 
 
 @borrowing
@@ -47,20 +53,40 @@ def signed_distance(x, model, faces, nearest, near):
         near: (3,) work space.
     """
     normals, offsets, first, start, corners = model[0], model[1], model[2], model[3], model[4]
-    squared = np.inf
-    # Seen from inside, the surface fills all directions; from outside it takes back what it gives.
-    seen = 0.0
+    squared, side = np.inf, 0.0
     for f in range(faces):
+        n = normals[f]
+        height = n[0] * x[0] + n[1] * x[1] + n[2] * x[2] - offsets[f]
+        if height * height > (1.0 + TIE) * squared:
+            continue
         for p in range(first[f], first[f + 1]):
-            gap, _, _ = nearest_in_polygon(
-                x, normals[f], offsets[f], corners, start[p], start[p + 1], near
+            gap, _, region, foot = foot_in_polygon(
+                x, n, offsets[f], corners, start[p], start[p + 1]
             )
+            if gap > (1.0 + TIE) * squared:
+                continue
+            if gap < (1.0 - TIE) * squared:
+                side = 0.0
             if gap < squared:
                 squared = gap
-                for k in range(3):
-                    nearest[k] = near[k]
-            seen += _solid_angle(x, corners, start[p], start[p + 1])
-    return -np.sqrt(squared) if seen > np.pi else np.sqrt(squared)
+                nearest[0], nearest[1], nearest[2] = foot
+            # Of two faces that meet at the nearest edge, the one seen more squarely knows the side.
+            if region != CORNER and abs(height) > abs(side):
+                side = height
+    distance = np.sqrt(squared)
+    if abs(side) <= GRAZING * distance:
+        side = np.pi - _solid_angle_of_all(x, model, faces)
+    return distance if side >= 0.0 else -distance
+
+
+@borrowing
+def _solid_angle_of_all(x, model, faces):
+    """Half the solid angle of the surface: all directions, or as much given as taken back."""
+    first, start, corners = model[2], model[3], model[4]
+    seen = 0.0
+    for p in range(first[0], first[faces]):
+        seen += _solid_angle(x, corners, start[p], start[p + 1])
+    return seen
 
 
 @borrowing
