@@ -24,7 +24,7 @@ from .contacts.support import SupportPlane
 from .models.features import Features
 from .models.polygon import Polygon
 from .models.polyhedron import Polyhedron
-from .poses.surroundings.surroundings import Surroundings
+from .poses.known import Surroundings
 from .tables.ranges import PairTables
 from .tree.limits import SearchLimits
 from .tree.tree import Constraints, spread_order

@@ -6,15 +6,9 @@ import numpy as np
 from scipy.spatial.transform import RigidTransform
 
 from .contacts.contacts import Contacts
-from .contacts.free_space import FreeSpace
-from .contacts.support import SupportPlane, stable_faces
-from .models.features import face_features
 from .models.polygon import Polygon
 from .models.polyhedron import Polyhedron
 from .models.rays import RayHits, cast_rays
-from .poses.fits.pose import Poses
-from .poses.surroundings.repair import repair
-from .poses.surroundings.surroundings import Surroundings, bounds_of, clear
 from .predict.pose_samples import sample_belief
 from .predict.prediction import predict
 from .predict.probes import ProbeSpace
@@ -38,24 +32,6 @@ def recognize_solids() -> None:
     predict(sample_belief(belief, [_box()], 64), ProbeSpace(1.0, 5.0).rays(np.zeros((1, 3))))
 
 
-def hold_against_surroundings() -> None:
-    """A pose beside free paths and a floor, and one to repair; without a search, which is another
-    part's."""
-    box, hits = _box(), _hits(5.0 * np.eye(3), -np.eye(3))
-    features, contacts = face_features(box), _few()
-    paths = FreeSpace(5.0 * np.eye(3), contacts.positions, error=0.01)
-    surroundings = Surroundings.of(paths, SupportPlane(height=-1.5, error=0.01, resting=True))
-    faces = hits.faces.astype(np.int32)[None]
-    one, nothing = np.eye(3)[None], np.zeros((1, 3))
-    poses = Poses(
-        faces, one, nothing, np.zeros(1), np.eye(6)[None], np.ones(1, bool), np.zeros((1, 2))
-    )
-    clear(box, features, poses, contacts, surroundings, stable_faces(box)[0])
-    bounds = bounds_of(box, features, contacts, surroundings)
-    # A little off, so that there is something to repair.
-    repair(hits.faces, np.eye(3), np.array([0.02, 0.0, 0.0]), bounds, steps=1)
-
-
 def prune_alone() -> None:
     """The tree without poses, with triples too."""
     tables = Recognizer([_box()]).tables("box")
@@ -71,7 +47,7 @@ def recognize_outlines() -> None:
     recognizer.sample_poses(recognizer.recognize(flat).hypotheses[0], flat, 4)
 
 
-PARTS = (recognize_solids, recognize_outlines, prune_alone, hold_against_surroundings)
+PARTS = (recognize_solids, recognize_outlines, prune_alone)
 """What can be compiled independently: the longest first, what shares most with it last."""
 
 

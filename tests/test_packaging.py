@@ -35,7 +35,7 @@ ROOMS = {
     "recognizer": (
         *("models", "contacts", "tables", "tree"),
         *("poses.motions", "poses.proofs", "poses.fits", "poses.planar"),
-        *("poses.surroundings", "beliefs", "predict", "advice"),
+        *("beliefs", "predict", "advice"),
     ),
     "envs": ("collision", "scene", "sensors", "pictures", "planar"),
     "policies": ("outcomes",),

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
 from ..contacts.contacts import Contacts
+from ..poses.known import Surroundings
 from ..poses.solid import SolidEntry
 from ..poses.solid_search import Aim, find_poses
-from ..poses.surroundings.surroundings import Surroundings
 from ..tree.limits import SearchLimits
 from ..tree.tree import Constraints
 from .hypotheses import Hypothesis, PoseTolerance, cluster

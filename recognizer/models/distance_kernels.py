@@ -42,7 +42,7 @@ def _solid_angle(x, corners, start, stop):
 
 
 @borrowing
-def signed_distance(x, model, faces, nearest, near):
+def signed_distance(x, model, faces, nearest):
     """How far a point is from a solid's surface, negative inside.
 
     Args:
@@ -50,7 +50,6 @@ def signed_distance(x, model, faces, nearest, near):
         model: see `pose.ModelTest`.
         faces: how many of its features are faces; they come first.
         nearest: (3,) the nearest point of the surface, written in place.
-        near: (3,) work space.
     """
     normals, offsets, first, start, corners = model[0], model[1], model[2], model[3], model[4]
     squared, side = np.inf, 0.0
@@ -90,7 +89,7 @@ def _solid_angle_of_all(x, model, faces):
 
 
 @borrowing
-def deepest(one, other, clearance, grain, bound, model, faces, place, point, nearest, near):
+def deepest(one, other, clearance, grain, bound, model, faces, place, point, nearest):
     """Where a path comes nearest to a solid, or runs deepest in it.
 
     The path is walked in steps that a signed distance allows, which changes no faster than the
@@ -107,7 +106,6 @@ def deepest(one, other, clearance, grain, bound, model, faces, place, point, nea
         place: (3,) the place found, written in place.
         point: (3,) work space.
         nearest: (3,) likewise.
-        near: (3,) likewise.
 
     Returns:
         The signed distance there, infinity if the whole path is out of reach.
@@ -134,7 +132,7 @@ def deepest(one, other, clearance, grain, bound, model, faces, place, point, nea
         share = at / length if length > 0.0 else 0.0
         for k in range(3):
             point[k] = one[k] + share * (other[k] - one[k])
-        distance = signed_distance(point, model, faces, nearest, near)
+        distance = signed_distance(point, model, faces, nearest)
         if distance < least:
             least = distance
             for k in range(3):

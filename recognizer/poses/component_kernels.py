@@ -10,6 +10,7 @@ import numpy as np
 
 from ..compiling import borrowing, kernel
 from .boxes_kernels import gibbs_between, recentre, shift_of, turn_chart
+from .breach_kernels import UNBROKEN, breaks_known
 from .fits.pose_kernels import finish, weigh
 from .motions.motion_kernels import copy_pose
 from .proofs.proof_kernels import workspace
@@ -110,7 +111,38 @@ def link_leaves(leaves, interpretations):
                     waiting[height] = other
                     height += 1
         found += 1
-    return labels, found
+    into, names = np.full(found, -1, np.int64), np.full(found, -1, np.int64)
+    return labels, _join_undecided(leaves, interpretations, labels, into, names)
+
+
+@borrowing
+def _join_undecided(leaves, interpretations, labels, into, names):
+    """Count components without a witness to one of their interpretation that has one.
+
+    What they may have of poses is then told as open. Arguments as in `link_leaves`; for each
+    component, work space of -1.
+
+    Returns:
+        How many components are left.
+    """
+    count = len(labels)
+    for m in range(count):
+        if leaves.proven[m]:
+            into[labels[m]] = labels[m]
+    for m in range(count):
+        if into[labels[m]] < 0:
+            for other in range(count):
+                if leaves.proven[other] and interpretations[other] == interpretations[m]:
+                    into[labels[m]] = labels[other]
+                    break
+    left = 0
+    for m in range(count):
+        k = into[labels[m]] if into[labels[m]] >= 0 else labels[m]
+        if names[k] < 0:
+            names[k] = left
+            left += 1
+        labels[m] = names[k]
+    return left
 
 
 @borrowing
@@ -158,23 +190,23 @@ def reach_of(at, leaves, seen, inverse, shift, middle, space):
 
 
 @kernel
-def report_components(leaves, labels, found, contacts, model, mean, radius):
+def report_components(leaves, labels, found, problem, seeking):
     """A pose of each component, and how far the others are from it.
 
     Args:
         leaves: see `cover.Leaves`.
         labels: (m,) the component of each.
         found: how many components there are.
-        contacts: see `pose.kernel_contacts`.
-        model: see `pose.ModelTest`.
-        mean: (3,) of the contacts, metres.
-        radius: metres.
+        problem: see `cover.Problem`.
+        seeking: see `work_space.seeking_space`.
 
     Returns:
         (k, n) features; (k, 3, 3) rotations and (k, 3) translations, object to world; (k,) misfits;
         (k, 6, 6) informations; (k,) whether the pose is a witness; (k, 2) the largest turn to
         another pose, radians, and the farthest way of the centroid, metres.
     """
+    contacts, model, known = problem.contacts, problem.model, problem.known
+    mean, radius = problem.touches.mean, problem.shape.radius
     n = leaves.fixed.shape[1]
     faces = np.full((found, n), -1, np.int32)
     rotations, translations = np.zeros((found, 3, 3)), np.zeros((found, 3))
@@ -204,9 +236,15 @@ def report_components(leaves, labels, found, contacts, model, mean, radius):
                 if labels[m] == k and within(m, leaves, inverse, shift, space[2]):
                     inside = True
                     break
-            if inside:
+            if inside and (
+                not known.anything
+                or breaks_known(
+                    features, known, model, rotations[k], translations[k], seeking[14], seeking[13]
+                )
+                == UNBROKEN
+            ):
                 continue
-            # The best fit is in another component, which has it already.
+            # The best fit is in another component, which has it already, or breaks what is known.
             copy_pose(leaves.rotations[at], leaves.translations[at], rotations[k], translations[k])
         costs[k] = weigh(
             n, features, contacts, model, rotations[k], translations[k], work, informations[k]

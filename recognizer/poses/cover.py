@@ -16,21 +16,19 @@ from numpy.typing import NDArray
 from ..contacts.contacts import Contacts
 from .cover_kernels import advance, begin
 from .fits.pose import kernel_contacts
+from .known import Known, nothing_known
 from .leaf_kernels import COUNTS, CUT, HEIGHT, NODES, TRIED
 from .node_kernels import OPEN
 from .shape import Shape, Touches, touches_of
+from .work_space import work_space
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Bools = NDArray[np.bool_]
 
-ROWS = 28
-"""Rows of a contact, on average, that there is room for; what finds none is left out."""
-CUTS = 4
-"""Cuts of a contact, likewise."""
-DEEP = 120
+DEEP = 240
 """Levels of a search, beside one for each contact: a box is cut in two about 30 times across each
-turn until rounding ends it."""
+turn or shift until rounding ends it."""
 STEPS = 10_000
 """Nodes between two looks at the limits: about a tenth of a second."""
 MOST_LEAVES = 256
@@ -81,6 +79,7 @@ class Problem(NamedTuple):
     touches: Touches
     tables: Tables
     aims: Aims
+    known: Known
 
 
 class Stack(NamedTuple):
@@ -133,55 +132,6 @@ class Leaves(NamedTuple):
     """Whether it meets every bound."""
 
 
-class Work(NamedTuple):
-    """Work space of a search, and what its steps hand to each other."""
-
-    turn: Floats
-    other: Floats
-    middle: Floats
-    """(3, 3) world to object: the middle of the box that was viewed last, ..."""
-    half: Floats
-    """(3,) ... half sides of the turns about it, ..."""
-    facings: Floats
-    """(n, 3) ... normals turned by it, ..."""
-    directions: Floats
-    """(d, 3) ... the directions of slabs turned back by it, and ..."""
-    ways: Floats
-    """(n, d, 2) ... extents of the arms in the box."""
-    hull: Floats
-    low: Floats
-    """(6,) a box: turns about the middle, radians, then shifts, radii."""
-    high: Floats
-    columns: Floats
-    """(7, m) rows and limits."""
-    programs: Any
-    """See `simplex_kernels.simplex_space`."""
-    objective: Floats
-    seen: Floats
-    sum: Floats
-    """(7,) see `polytope_kernels.tighten`."""
-    cuts: Floats
-    """(c, 4) directions, and how far out along them the polygon reaches, in radii."""
-    cut_of: Ints
-    """(c,) the contact of each."""
-    cut_count: Ints
-    """(1,)"""
-    rotation: Floats
-    translation: Floats
-    seeking: Any
-    """See `witness_kernels.seek_witness`."""
-    best: Floats
-    shift: Floats
-    mean: Floats
-    """(3,) of the contacts, metres."""
-    form: Floats
-    vectors: Floats
-    charts: Floats
-    """(2, 3, 3) see `first_box_kernels.first_boxes`, and ..."""
-    sides: Floats
-    """... (2, 3) likewise."""
-
-
 @dataclass(frozen=True, eq=False)
 class Cover:
     """What a search found."""
@@ -210,7 +160,8 @@ def search_cover(
     """
     n, words = domains.shape
     directions = len(problem.shape.directions)
-    stack, work = _stack(n, words, directions), work_space(n, directions, problem.touches.mean)
+    stack = _stack(n, words, directions)
+    work = work_space(n, directions, problem.touches.mean, problem.known)
     stack.domains[0] = domains
     stack.rooms[0] = -np.inf, np.inf
     tables = problem.tables
@@ -245,7 +196,13 @@ def join(parts: Sequence[Leaves]) -> Leaves:
 
 
 def problem_of(
-    shape: Shape, model: Any, packed: Floats, contacts: Contacts, switches: int, aims: Aims
+    shape: Shape,
+    model: Any,
+    packed: Floats,
+    contacts: Contacts,
+    switches: int,
+    aims: Aims,
+    known: Known | None = None,
 ) -> Problem:
     """What a search for poses of a solid reads.
 
@@ -256,11 +213,13 @@ def problem_of(
         contacts: at least one.
         switches: bits, which constraints on pairs to apply.
         aims: what it is to find out.
+        known: what is known besides the contacts.
     """
     touches, count = touches_of(contacts, shape.radius), len(contacts)
     readings = np.empty((count, count, 9))
     tables = Tables(packed, shape.half_angles, readings, touches.errors, switches)
-    return Problem(shape, model, kernel_contacts(contacts), touches, tables, aims)
+    known = known or nothing_known(count)
+    return Problem(shape, model, kernel_contacts(contacts), touches, tables, aims, known)
 
 
 def _stack(n: int, words: int, directions: int) -> Stack:
@@ -292,49 +251,4 @@ def _leaves(n: int, most: int) -> Leaves:
         rotations=empty((most, 3, 3)),
         translations=empty((most, 3)),
         proven=empty(most, np.bool_),
-    )
-
-
-def work_space(n: int, directions: int, mean: Floats) -> Work:
-    """Work space for so many contacts, of a mean (3,), metres, and directions of slabs."""
-    empty, rows, cuts = np.empty, ROWS * n, CUTS * n
-    readings = (
-        *(empty((n, 3)), empty(n), empty(n), empty(n, np.int64), empty(n, np.int64)),
-        *(empty(n), empty((n, 3))),
-    )
-    return Work(
-        turn=empty((3, 3)),
-        other=empty((3, 3)),
-        middle=empty((3, 3)),
-        half=empty(3),
-        facings=empty((n, 3)),
-        directions=empty((directions, 3)),
-        ways=empty((n, directions, 2)),
-        hull=empty((directions, 2)),
-        low=empty(6),
-        high=empty(6),
-        columns=empty((7, rows)),
-        programs=(
-            *(empty(6, np.int64), empty((6, 6)), empty(6), empty(6), empty(6), empty(6)),
-            *(empty(rows), empty(rows), empty(rows), np.zeros(1, np.bool_)),
-        ),
-        objective=empty(6),
-        seen=empty((6, 2)),
-        sum=empty(7),
-        cuts=empty((cuts, 4)),
-        cut_of=empty(cuts, np.int64),
-        cut_count=np.zeros(1, np.int64),
-        rotation=empty((3, 3)),
-        translation=empty(3),
-        seeking=(
-            *(readings, empty((n, 3)), empty((n, 3)), empty((6, 6)), np.zeros((6, 6))),
-            *(empty(6), empty(6), empty(6), empty(3), empty(3), empty(3), empty((3, 3)), empty(3)),
-        ),
-        best=empty((3, 3)),
-        shift=empty(3),
-        mean=mean.copy(),
-        form=empty((4, 4)),
-        vectors=empty((4, 4)),
-        charts=empty((2, 3, 3)),
-        sides=empty((2, 3)),
     )

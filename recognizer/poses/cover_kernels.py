@@ -15,14 +15,16 @@ from .first_box_kernels import ALL, IMPOSSIBLE, first_boxes
 from .leaf_kernels import (
     BY_PIECES,
     CUT,
-    CUT_UP,
+    CUT_ANY,
     HANDY,
     HEIGHT,
     LEAF,
     NODES,
+    longest_side,
     on_pieces,
     settle_leaf,
 )
+from .leaf_kernels import GONE as NOTHING
 from .node_kernels import (
     NONE,
     copy_node,
@@ -151,7 +153,7 @@ def narrow_node(top, problem, stack, work):
             return ASSIGNED
         if assigned < FEWEST or angle > HANDY or ways <= aims.crowd:
             break
-        share = tighten_turns(top, stack, shape, touches, work)
+        share = tighten_turns(top, stack, problem, work)
         if share < 0.0:
             return GONE
         if share > NARROWED:
@@ -202,8 +204,11 @@ def step(top, found, problem, stack, leaves, counts, work):
             if pieces == 0:
                 counts[CUT] = 1
             return pieces, False
-        if leaf != CUT_UP:
+        if leaf in (NOTHING, LEAF):
             return 0, leaf == LEAF
+        if leaf == CUT_ANY:
+            split(top, longest_side(work), stack)
+            return 2, False
     view(top, stack, problem.shape, problem.touches, work)
     axis, far = widest(top, stack, problem.touches, work)
     if outcome != ASSIGNED and (outcome == BRANCHES or far <= aims.coarse):
@@ -222,7 +227,7 @@ def advance(problem, stack, leaves, counts, work, steps):
         stack: see `cover.Stack`.
         leaves: see `cover.Leaves`; the first rows are written.
         counts: see `leaf_kernels.NODES`; the nodes that are left are `HEIGHT`.
-        work: see `cover.Work`.
+        work: see `work_space.Work`.
         steps: the most nodes to look at.
 
     Returns:

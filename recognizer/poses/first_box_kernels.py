@@ -74,8 +74,8 @@ def first_boxes(fixed, shape, touches, work):
         fixed: (n,) the feature of each contact, below zero for none.
         shape: see `shape.Shape`.
         touches: see `shape.Touches`.
-        work: see `cover.Work`; ``charts`` and ``sides`` are written in place: rotations, world to
-            object, and half sides of boxes of Gibbs vectors about them.
+        work: see `work_space.Work`; ``charts`` and ``sides`` are written in place: rotations,
+            world to object, and half sides of boxes of Gibbs vectors about them.
 
     Returns:
         How many turns are open: none, and one box holds the rotations; one, and two do; `ALL`, and

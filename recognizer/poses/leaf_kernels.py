@@ -15,17 +15,18 @@ from ..compiling import borrowing
 from .boxes_kernels import gibbs_between, shift_of, turn_chart
 from .motions.motion_kernels import copy_pose
 from .node_kernels import view
+from .path_kernels import heed_paths
 from .polytope_kernels import tighten
 from .shrink_kernels import cut_rows, keep_box, note_cuts, rows_of, set_box
-from .witness_kernels import seek_witness
+from .witness_kernels import CONTACTS, NONE, POLYGONS, WITNESS, seek_witness
 
 NODES, TRIED, HEIGHT, CUT = 0, 1, 2, 3
 """Places of counts: nodes looked at; searches for a witness; how many nodes are on the stack;
 whether one was left out for want of room."""
 COUNTS = 4
-GONE, LEAF, CUT_UP, BY_PIECES = 0, 1, 2, 3
-"""What becomes of a node: no pose is left; it is a leaf; it is to be cut across a turn, or by the
-convex pieces of a concave face."""
+GONE, LEAF, CUT_UP, BY_PIECES, CUT_ANY = 0, 1, 2, 3, 4
+"""What becomes of a node: no pose is left; it is a leaf; it is to be cut across a turn, by the
+convex pieces of a concave face, or across a turn or a shift."""
 ROUNDS = 3
 """Times that a box is tightened before it is told whether its poses are far apart."""
 SHRINKS = 0.7
@@ -38,6 +39,11 @@ FINE = 0.2
 """Bounds that linearising may leave out of a box that counts as known."""
 FINEST = 0.02
 """The same, of a box without a witness that is not cut further: it is left undecided."""
+PATIENCE, POOL = 60, 400
+"""Boxes that contacts allow, and that are cut for what else is known: of one interpretation, and of
+all together."""
+LOOSE = 0.1
+"""Bounds of what is known besides contacts, that a box without a witness may be wide."""
 NEARBY = 1e-6
 """Radians, and radii: a box may be a point."""
 
@@ -82,8 +88,10 @@ def end_pose(z, shape, work):
 
 
 @borrowing
-def seek_from(z, top, problem, stack, work):
+def seek_from(z, heeding, top, problem, stack, work):
     """A witness of a node, sought from a turn about the box's middle and a shift, (6,) together.
+
+    It breaks nothing else that is known, if that is heeded.
 
     Returns:
         See `witness_kernels.seek_witness`.
@@ -94,6 +102,8 @@ def seek_from(z, top, problem, stack, work):
         stack.targets[top],
         problem.contacts,
         problem.model,
+        problem.known,
+        heeding and problem.known.anything,
         work.rotation,
         work.translation,
         work.seeking,
@@ -116,9 +126,10 @@ def coordinates(rotation, translation, radius, work, z):
 
 @borrowing
 def spreads(top, problem, stack, work):
-    """Whether a pose within the bounds is farther from the witness than alike.
+    """Whether a pose within the bounds on contacts is farther from the witness than alike.
 
-    It is sought from twice as far, along each axis along which the box is so wide.
+    What else is known is not asked here: a box is then told as wider than it is. The pose is sought
+    from twice as far, along each axis along which the box is so wide.
     """
     shape, aims = problem.shape, problem.aims
     z, least = work.objective, 1.0 + 2.0 * np.cos(aims.turn)
@@ -129,8 +140,7 @@ def spreads(top, problem, stack, work):
         for side in (-1.0, 1.0):
             coordinates(work.best, work.shift, shape.radius, work, z)
             z[k] += side * step
-            met, _ = seek_from(z, top, problem, stack, work)
-            if not met:
+            if seek_from(z, False, top, problem, stack, work) != WITNESS:
                 continue
             trace, square = 0.0, 0.0
             for a in range(3):
@@ -171,6 +181,12 @@ def emit(top, proven, at, stack, leaves, work):
         )
         leaves.translations[at, a] = work.translation[a]
     leaves.proven[at] = proven
+    if proven:
+        # It has a witness.
+        n = stack.fixed.shape[1]
+        for j in range(n):
+            work.latest[j] = stack.fixed[top, j]
+        work.latest[n] = PATIENCE
 
 
 @borrowing
@@ -184,21 +200,22 @@ def seek_inside(top, near, problem, stack, counts, work):
         problem: see `cover.Problem`.
         stack: see `cover.Stack`.
         counts: see `NODES`.
-        work: see `cover.Work`.
+        work: see `work_space.Work`.
 
     Returns:
-        Whether one was found, and whether one was on the polygons that stand for the faces.
+        See `witness_kernels.seek_witness`; `CONTACTS` if there is one, but not near.
     """
     counts[TRIED] += 1
     for k in range(6):
         work.objective[k] = 0.5 * (work.low[k] + work.high[k])
         if work.sum[6] > 0.0:
             work.objective[k] = work.sum[k] / work.sum[6]
-    met, on_polygons = seek_from(work.objective, top, problem, stack, work)
-    met = met and (not near or is_near(problem.shape.radius, work))
-    if met:
+    found = seek_from(work.objective, True, top, problem, stack, work)
+    if found == WITNESS:
+        if near and not is_near(problem.shape.radius, work):
+            return CONTACTS
         copy_pose(work.rotation, work.translation, work.best, work.shift)
-    return met, on_polygons
+    return found
 
 
 @borrowing
@@ -214,6 +231,45 @@ def is_near(radius, work):
 
 
 @borrowing
+def slack_left(angle, problem, work):
+    """How far poses of a tightened box move the solid, at most, in the least of the bounds."""
+    known, square = problem.known, 0.0
+    least = known.slack if len(known.corners) > 0 else np.inf
+    for s in range(len(known.scales)):
+        least = min(least, known.scales[s])
+    for k in range(3, 6):
+        square += (0.5 * (work.high[k] - work.low[k])) ** 2
+    return (angle + np.sqrt(square)) * problem.shape.radius / least
+
+
+@borrowing
+def is_worth_it(top, stack, work):
+    """Whether to go on looking for a witness of an interpretation, or a proof that it has none.
+
+    Not if it has one: what else may be left of it is told as open. Nor if it took too long.
+    """
+    n, same = stack.fixed.shape[1], True
+    for j in range(n):
+        same &= work.latest[j] == stack.fixed[top, j]
+        work.latest[j] = stack.fixed[top, j]
+    if not same:
+        work.latest[n] = 0
+    work.latest[n] += 1
+    work.latest[n + 1] += 1
+    return work.latest[n] < PATIENCE and work.latest[n + 1] < POOL
+
+
+@borrowing
+def longest_side(work):
+    """The longest side of a tightened box, turns counted at a radius."""
+    best = 0
+    for k in range(1, 6):
+        if work.high[k] - work.low[k] > work.high[best] - work.low[best]:
+            best = k
+    return best
+
+
+@borrowing
 def settle_leaf(top, at, problem, stack, leaves, counts, work):
     """What becomes of a node whose contacts are all assigned.
 
@@ -224,27 +280,33 @@ def settle_leaf(top, at, problem, stack, leaves, counts, work):
         stack: see `cover.Stack`.
         leaves: see `cover.Leaves`.
         counts: see `NODES`.
-        work: see `cover.Work`.
+        work: see `work_space.Work`.
 
     Returns:
-        `GONE`, `LEAF`, `CUT_UP` or `BY_PIECES`.
+        `GONE`, `LEAF`, `CUT_UP`, `BY_PIECES` or `CUT_ANY`.
     """
     shape, touches, aims = problem.shape, problem.touches, problem.aims
     work.cut_count[0] = 0
-    on_polygons, met, tries, coarse = False, False, 0, np.inf
+    found, tries, coarse, angle = NONE, 0, np.inf, np.pi
     for turn in range(2 * ROUNDS):
         view(top, stack, shape, touches, work)
         set_box(top, stack, work)
-        used = cut_rows(touches, rows_of(top, stack, shape, touches, work), work)
+        used = cut_rows(rows_of(top, stack, problem, work), work)
         share = tighten(0, 6, used, work)
         if share < 0.0:
             return GONE
         keep_box(top, stack, work)
         coarse, angle = coarseness(top, stack, touches, work)
         handy = angle < HANDY or coarse < 1.0
-        if not met:
-            met, on_polygons = seek_inside(top, handy, problem, stack, counts, work)
-        if met:
+        if found != WITNESS and handy and len(problem.known.starts) > 0:
+            for k in range(6):
+                work.objective[k] = 0.5 * (work.low[k] + work.high[k]) if k >= 3 else 0.0
+            end_pose(work.objective, shape, work)
+            if not heed_paths(problem, work):
+                return GONE
+        if found != WITNESS and (found != CONTACTS or share > STUCK):
+            found = seek_inside(top, handy, problem, stack, counts, work)
+        if found == WITNESS:
             if coarse > FINE and not alike(top, angle, stack, aims):
                 if handy and share < SHRINKS and turn < ROUNDS:
                     continue
@@ -253,14 +315,19 @@ def settle_leaf(top, at, problem, stack, leaves, counts, work):
             copy_pose(work.best, work.shift, work.rotation, work.translation)
             emit(top, True, at, stack, leaves, work)
             return LEAF
-        if on_polygons and on_pieces(top, stack, shape) >= 0:
+        if found == POLYGONS and on_pieces(top, stack, shape) >= 0:
             return BY_PIECES
         if not handy:
             return CUT_UP
         tries += 1
-        if tries > 1 and coarse > FINEST and share > STUCK:
+        if tries > 1 and share > STUCK and (coarse > FINEST or found == CONTACTS):
             break
         note_cuts(top, problem, stack, work)
+    if found == CONTACTS and problem.known.anything:
+        if slack_left(angle, problem, work) > LOOSE and is_worth_it(top, stack, work):
+            return CUT_ANY
+        emit(top, False, at, stack, leaves, work)
+        return LEAF
     if coarse >= FINEST:
         return CUT_UP
     if on_pieces(top, stack, shape) >= 0:

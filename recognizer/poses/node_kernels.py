@@ -90,8 +90,10 @@ def settle_singles(top, stack, tables, spare):
 def fits(j, f, angle, room, shape, touches, work):
     """Whether a contact can be on a feature in the box that was viewed; if so the hull grows."""
     error, reach = touches.errors[j], touches.reaches[j]
-    return facing(work.facings[j], error, angle, f, shape) and fits_room(
-        work.ways[j], reach, shape.slabs[f], room, work.hull
+    return (
+        facing(work.facings[j], error, angle, f, shape)
+        and facing(work.fronts[j], touches.front_errors[j], angle, f, shape)
+        and fits_room(work.ways[j], reach, shape.slabs[f], room, work.hull)
     )
 
 
@@ -106,7 +108,7 @@ def narrow_in_box(top, angle, spare, stack, shape, touches, work):
         stack: see `cover.Stack`, changed in place.
         shape: see `shape.Shape`.
         touches: see `shape.Touches`.
-        work: see `cover.Work`.
+        work: see `work_space.Work`.
 
     Returns:
         1 if something changed that a second look could use, 0 if not, -1 if no pose is left.
@@ -156,6 +158,7 @@ def view(top, stack, shape, touches, work):
         stack.charts[top], stack.lows[top], stack.highs[top], work.turn, work.half, work.middle
     )
     turn_all(work.middle, touches.normals, work.facings)
+    turn_all(work.middle, touches.fronts, work.fronts)
     turn_back(work.middle, shape.directions, work.directions)
     return angle
 
@@ -219,12 +222,14 @@ def copy_node(source, target, stack):
 
 @borrowing
 def split(top, axis, stack):
-    """Cut a node's box across a turn; the halves are in its place and in the next one.
-
-    Its box is about the middle that was viewed last.
-    """
+    """Cut a node's box across a turn or, from the fourth axis on, a shift, into two places."""
     stack.boxed[top] = True
     copy_node(top, top + 1, stack)
+    if axis >= 3:
+        k = axis - 3
+        stack.rooms[top, k, 1] = 0.5 * (stack.rooms[top, k, 0] + stack.rooms[top, k, 1])
+        stack.rooms[top + 1, k, 0] = stack.rooms[top, k, 1]
+        return
     stack.highs[top, axis] = 0.5 * (stack.lows[top, axis] + stack.highs[top, axis])
     stack.lows[top + 1, axis] = stack.highs[top, axis]
 

@@ -21,7 +21,7 @@ def tighten(first, last, count, work):
         first: the first axis.
         last: one past the last.
         count: how many of the rows count.
-        work: see `cover.Work`. Its box, ``low`` and ``high``, is shrunk in place; ``sum`` is
+        work: see `work_space.Work`. Its box, ``low`` and ``high``, is shrunk in place; ``sum`` is
             that of all vertices met, and how many.
 
     Returns:

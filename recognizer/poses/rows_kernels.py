@@ -75,10 +75,10 @@ def extent(a, m, half, angle):
 
 
 @borrowing
-def add_row(a, m, moves, limit, work, used):
-    """Ask that ``m . (Q a + s)``, without ``s`` if nothing moves, is at most ``limit``.
+def add_row(a, m, along, limit, work, used):
+    """Ask that ``m . Q a + along . s`` is at most ``limit``.
 
-    Left out if the box (``middle``, ``half``, ``low`` and ``high`` of `cover.Work`) implies it.
+    Left out if the box (``middle``, ``half``, ``low``, ``high`` of `work_space.Work`) implies it.
 
     Returns:
         How many rows there are then.
@@ -88,13 +88,14 @@ def add_row(a, m, moves, limit, work, used):
     n1 = q[0, 1] * m[0] + q[1, 1] * m[1] + q[2, 1] * m[2]
     n2 = q[0, 2] * m[0] + q[1, 2] * m[1] + q[2, 2] * m[2]
     c0, c1, c2 = a[1] * n2 - a[2] * n1, a[2] * n0 - a[0] * n2, a[0] * n1 - a[1] * n0
-    along = a[0] * n0 + a[1] * n1 + a[2] * n2
+    here = a[0] * n0 + a[1] * n1 + a[2] * n2
     most = max(c0 * low[0], c0 * high[0]) + max(c1 * low[1], c1 * high[1])
     most += max(c2 * low[2], c2 * high[2])
-    if moves:
-        for k in range(3):
-            most += max(m[k] * low[3 + k], m[k] * high[3 + k])
-    room = limit - along + ROUNDING
+    for k in range(3):
+        # Shifts may have no limits yet.
+        if along[k] != 0.0:
+            most += max(along[k] * low[3 + k], along[k] * high[3 + k])
+    room = limit - here + ROUNDING
     if most <= room or used == columns.shape[1]:
         return used
     least, _ = remainder(a, (n0, n1, n2), work.half)
@@ -103,7 +104,7 @@ def add_row(a, m, moves, limit, work, used):
         return used
     columns[0, used], columns[1, used], columns[2, used] = c0, c1, c2
     for k in range(3):
-        columns[3 + k, used] = m[k] if moves else 0.0
+        columns[3 + k, used] = along[k]
     columns[6, used] = room
     return used + 1
 
@@ -122,7 +123,7 @@ def contact_rows(i, feature, polygon, shape, touches, work, used):
         polygon: the polygon that stands for it.
         shape: see `shape.Shape`.
         touches: see `shape.Touches`.
-        work: see `cover.Work`: the box, and ``columns``, written in place.
+        work: see `work_space.Work`: the box, and ``columns``, written in place.
         used: how many rows there are.
 
     Returns:
@@ -131,15 +132,66 @@ def contact_rows(i, feature, polygon, shape, touches, work, used):
     arm, normal = touches.arms[i], touches.normals[i]
     reach, error = touches.reaches[i], touches.errors[i]
     for side in range(shape.side_start[polygon], shape.side_start[polygon + 1]):
-        used = add_row(arm, shape.sides[side], True, shape.limits[side] + reach, work, used)
+        m = shape.sides[side]
+        used = add_row(arm, m, m, shape.limits[side] + reach, work, used)
+    # The other way round, so that all rows are bounds from above.
+    back = work.lever
+    for k in range(3):
+        back[k] = -shape.normals[feature, k]
     wide = error + shape.half_angles[feature]
     if wide < np.pi:
-        m = shape.normals[feature]
-        # The other way round, so that all rows are bounds from above.
-        back = (-m[0], -m[1], -m[2])
-        used = add_row(normal, back, False, -np.cos(wide), work, used)
+        used = add_row(normal, back, work.still, -np.cos(wide), work, used)
+    wide = touches.front_errors[i] + shape.half_angles[feature]
+    if wide < np.pi:
+        used = add_row(touches.fronts[i], back, work.still, -np.cos(wide), work, used)
     if error < 0.5 * np.pi:
         sine = np.sin(error)
         for k in range(shape.cone_start[feature], shape.cone_start[feature + 1]):
-            used = add_row(normal, shape.cone_sides[k], False, sine, work, used)
+            used = add_row(normal, shape.cone_sides[k], work.still, sine, work, used)
+    return used
+
+
+@borrowing
+def support_rows(foot, known, radius, work, used):
+    """What a support asks of the poses in a box: that corners are above or below a height.
+
+    About the contacts' mean the height of a corner ``v`` is ``Q up . (v - s)``. What that has of
+    both a turn and a shift is no more than the chord of the one times the length of the other.
+
+    Args:
+        foot: the face that the object stands on, -1 if that isn't known.
+        known: see `known.Known`.
+        radius: metres.
+        work: see `work_space.Work`: the box, and ``columns``, written in place.
+        used: how many rows there are.
+
+    Returns:
+        How many there are then.
+    """
+    up, q, lever, slope = known.up, work.middle, work.lever, work.slope
+    square, apart, base, here = 0.0, 0.0, 0.0, 0.0
+    for k in range(3):
+        square += work.half[k] * work.half[k]
+        apart += (0.5 * (work.high[3 + k] - work.low[3 + k])) ** 2
+        base += up[k] * work.mean[k]
+        here += (
+            (q[k, 0] * up[0] + q[k, 1] * up[1] + q[k, 2] * up[2])
+            * 0.5
+            * (work.high[3 + k] + work.low[3 + k])
+        )
+    bend = np.sqrt(square / (1.0 + 0.25 * square) * apart)
+    if not bend < np.inf:
+        return used
+    count = len(known.corners)
+    first, last = (known.foot_start[foot], known.foot_start[foot + 1]) if foot >= 0 else (0, 0)
+    for v in range(count + last - first):
+        corner = known.corners[v] if v < count else known.feet[first + v - count]
+        sign = known.signs[v] if v < count else -1.0
+        limit = known.limits[v] if v < count else known.ceiling
+        for k in range(3):
+            middle = 0.5 * (work.high[3 + k] + work.low[3 + k])
+            lever[k] = -sign * (corner[k] / radius - middle)
+            slope[k] = sign * (q[k, 0] * up[0] + q[k, 1] * up[1] + q[k, 2] * up[2])
+        limit = -sign * (limit - base) / radius + sign * here + bend
+        used = add_row(up, lever, slope, limit, work, used)
     return used

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..contacts.contacts import Contacts
+from ..contacts.contacts import APPROACH_ERROR, Contacts
 from ..models.features import Features
 
 Floats = NDArray[np.float64]
@@ -59,6 +59,10 @@ class Touches(NamedTuple):
     """(n,) bounds on positions."""
     errors: Floats
     """(n,) bounds on normals, radians."""
+    fronts: Floats
+    """(n, 3) the way back along each approach, unit; zero where that is unknown."""
+    front_errors: Floats
+    """(n,) how far from it a normal may be, radians; half a turn where it is unknown."""
     mean: Floats
     """(3,) of the positions, metres."""
 
@@ -71,6 +75,8 @@ def touches_of(contacts: Contacts, radius: float) -> Touches:
         contacts.normals.copy(),
         contacts.position_error / radius,
         contacts.normal_error.copy(),
+        -contacts.approaches,
+        np.where(contacts.approach_known, 0.5 * np.pi + APPROACH_ERROR, np.pi),
         mean,
     )
 

@@ -9,8 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from ..compiling import borrowing
+from .breach_kernels import stands_on
 from .polytope_kernels import tighten
-from .rows_kernels import add_row, contact_rows
+from .rows_kernels import add_row, contact_rows, support_rows
 
 NEAR = 0.5
 """Gaps of less, in bounds, give no cut."""
@@ -25,23 +26,26 @@ def set_box(top, stack, work):
 
 
 @borrowing
-def rows_of(top, stack, shape, touches, work):
-    """The rows of all contacts that are assigned, in the box; returns how many."""
+def rows_of(top, stack, problem, work):
+    """The rows of all contacts that are assigned, and of the support; returns how many."""
+    shape, touches, known = problem.shape, problem.touches, problem.known
     used = 0
     for j in range(len(touches.arms)):
         f = stack.fixed[top, j]
         if f >= 0:
             used = contact_rows(j, f, stack.targets[top, j], shape, touches, work, used)
+    if len(known.corners) > 0:
+        foot = stands_on(stack.fixed[top], known)
+        used = support_rows(foot, known, shape.radius, work, used)
     return used
 
 
 @borrowing
-def cut_rows(touches, used, work):
+def cut_rows(used, work):
     """The rows of cuts, behind ``used`` others; returns how many there are then."""
     for c in range(work.cut_count[0]):
-        i = work.cut_of[c]
-        limit = work.cuts[c, 3] + touches.reaches[i]
-        used = add_row(touches.arms[i], work.cuts[c], True, limit, work, used)
+        cut = work.cuts[c]
+        used = add_row(work.cut_arms[c], cut, cut, cut[3], work, used)
     return used
 
 
@@ -59,17 +63,17 @@ def note_cuts(top, problem, stack, work):
         at, polygon = work.cut_count[0], stack.targets[top, i]
         if stack.fixed[top, i] < 0 or lengths[i] < NEAR * reaches[i] * radius:
             continue
-        if at == len(work.cut_of):
+        if at == len(work.cuts):
             return
         cut = work.cuts[at]
         for k in range(3):
             cut[k] = gaps[i, k] / lengths[i]
+            work.cut_arms[at, k] = problem.touches.arms[i, k]
         most = -np.inf
         for c in range(start[polygon], start[polygon + 1]):
             along = cut[0] * corners[c, 0] + cut[1] * corners[c, 1] + cut[2] * corners[c, 2]
             most = max(most, along)
-        cut[3] = most / radius
-        work.cut_of[at] = i
+        cut[3] = most / radius + reaches[i]
         work.cut_count[0] += 1
 
 
@@ -97,14 +101,14 @@ def keep_box(top, stack, work):
 
 
 @borrowing
-def tighten_turns(top, stack, shape, touches, work):
+def tighten_turns(top, stack, problem, work):
     """Shrink the turns of a node that was viewed, by what is assigned.
 
     Returns:
         What is left of its longest side, at most, as a share; below zero if no pose is left.
     """
     set_box(top, stack, work)
-    used = rows_of(top, stack, shape, touches, work)
+    used = rows_of(top, stack, problem, work)
     if used == 0:
         return 1.0
     share = tighten(0, 3, used, work)

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..contacts.contacts import Contacts
+from ..contacts.support import StableFace
 from ..models.polyhedron import Polyhedron
 from ..tree.limits import SearchLimits
 from ..tree.tree import Constraints
 from .component_kernels import link_leaves, report_components
 from .cover import Aims, problem_of, search_cover
 from .fits.pose import Poses
+from .known import NOWHERE, Surroundings, known_of
 from .solid import Bits, SolidEntry, bit_set
-from .surroundings.surroundings import Surroundings, clear
+from .work_space import seeking_space
 
 EXACT_SYMMETRY = 1e-7
 """How far a symmetry may miss, as a share of the smallest bound on a position, to stand for a part
@@ -90,10 +93,8 @@ def find_poses(
     )
     if symmetric:
         domains[0] &= entry.orbits
-    found = _find(entry, contacts, aim, domains)
+    found = _find(entry, contacts, aim, domains, surroundings)
     poses = found.poses
-    if not surroundings.says_nothing(contacts):
-        poses = clear(entry.model, entry.features, poses, contacts, surroundings)
     if symmetric:
         poses = _spread_over_symmetries(entry.model, poses, permutations)
     return replace(found, poses=poses)
@@ -108,8 +109,21 @@ def _domains(entry: SolidEntry, contacts: Contacts, known: NDArray[np.int32] | N
     return domains
 
 
-def _find(entry: SolidEntry, contacts: Contacts, aim: Aim, domains: Bits) -> Found:
-    """The same where nothing else is known, with the features that each contact may be on."""
+def _find(
+    entry: SolidEntry,
+    contacts: Contacts,
+    aim: Aim,
+    domains: Bits,
+    surroundings: Surroundings,
+    feet: Sequence[StableFace] = (),
+    square: int = NOWHERE,
+) -> Found:
+    """The same, with the features that each contact may be on.
+
+    Args:
+        feet: faces of its hull that the solid may stand on, if it does.
+        square: the feature that stands for the first, if the first contact says which it is.
+    """
     upright, contacts = _upright(contacts)
     shape, model = entry.shape, entry.test.model
     largest = float(contacts.position_error.max()) / shape.radius
@@ -121,7 +135,8 @@ def _find(entry: SolidEntry, contacts: Contacts, aim: Aim, domains: Bits) -> Fou
         turn=aim.turn,
         shift=aim.shift / shape.radius,
     )
-    problem = problem_of(shape, model, entry.packed, contacts, aim.constraints.bits, aims)
+    known = known_of(entry.model, contacts, surroundings, upright, feet, square)
+    problem = problem_of(*(shape, model, entry.packed, contacts, aim.constraints.bits, aims), known)
     cover = search_cover(
         problem, domains, most_nodes=aim.limits.nodes, most_found=aim.limits.budget
     )
@@ -129,7 +144,8 @@ def _find(entry: SolidEntry, contacts: Contacts, aim: Aim, domains: Bits) -> Fou
     labels, count = link_leaves(leaves, cover.interpretations)
     poses = Poses(
         *report_components(
-            *(leaves, labels, count, problem.contacts, model, problem.touches.mean, shape.radius)
+            *(leaves, labels, count, problem),
+            seeking_space(len(contacts), len(known.starts)),
         )
     )
     poses = replace(
@@ -147,32 +163,33 @@ def _find_standing(
     surroundings: Surroundings,
     known: NDArray[np.int32] | None,
 ) -> Found:
-    """The search of a solid that stands on a face of its hull: each such face in its turn.
-
-    The support is one more contact, on that face.
-    """
+    """The search of a solid that stands on a face of its hull: the support is one more contact."""
     support = surroundings.support
     assert support is not None
-    standing = entry.standing
+    standing, stable = entry.standing, entry.stable_faces
     count, size = len(entry.features), len(standing.features)
     own = _domains(entry, contacts, known)
     domains = np.zeros((len(contacts) + 1, -(-size // 64)), np.uint64)
     domains[1:, : own.shape[1]] = own
     parts: list[Found] = []
-    plain: Found | None = None
-    for index, face in enumerate(entry.stable_faces):
+    alike: dict[float, tuple[Contacts, list[int]]] = {}
+    for index, face in enumerate(stable):
         touch = support.touch(face, entry.model.diameter, contacts, aim.outliers)
         if touch is None:
-            # Bounds so wide that the face's plane, as a contact, says nothing: only the pose does.
-            plain = plain or _find(entry, contacts, aim, own)
-            poses = clear(entry.model, entry.features, plain.poses, contacts, surroundings, face)
-            parts.append(replace(plain, poses=poses))
+            # Bounds so wide that the face's plane, as a contact, says nothing: its corners do.
+            parts.append(_find(entry, contacts, aim, own, surroundings, [face]))
             continue
+        # Faces of about one width are one search, with the widest of their bounds.
+        step = np.ceil(np.log2(touch.normal_error[0]))
+        widest, members = alike.setdefault(step, (touch, []))
+        members.append(index)
+        if touch.normal_error[0] > widest.normal_error[0]:
+            alike[step] = touch, members
+    for touch, members in alike.values():
         everything = Contacts.join([touch, contacts])
-        domains[0] = bit_set(np.array([count + index]), size)
-        found = _find(standing, everything, aim, domains)
+        domains[0] = bit_set(count + np.array(members), size)
+        found = _find(standing, everything, aim, domains, surroundings, stable, count)
         poses = found.poses.take(found.poses.faces[:, 0] >= 0)
-        poses = clear(entry.model, standing.features, poses, everything, surroundings, face)
         poses = replace(poses, faces=np.ascontiguousarray(poses.faces[:, 1:]))
         parts.append(replace(found, poses=poses))
     return Found(
@@ -198,13 +215,13 @@ def _upright(contacts: Contacts) -> tuple[Floats, Contacts]:
         axis /= np.linalg.norm(axis)
     one = np.cross(axis, np.eye(3)[np.abs(axis).argmin()])
     one /= np.linalg.norm(one)
-    turn = np.array([one, np.cross(axis, one), axis])
+    turn = np.array([one, np.cross(axis, one), axis], np.float64)
     return turn, Contacts.trusted(
         np.ascontiguousarray(contacts.positions @ turn.T),
         np.ascontiguousarray(contacts.normals @ turn.T),
         position_error=contacts.position_error,
         normal_error=contacts.normal_error,
-        approaches=contacts.approaches,
+        approaches=np.ascontiguousarray(contacts.approaches @ turn.T),
         kinds=contacts.kinds,
     )
 

@@ -11,8 +11,12 @@ import numpy as np
 
 from ..compiling import borrowing
 from ..contacts.reading_kernels import ARC, NO_CONE, carry, meets_all, read
+from .breach_kernels import ANEW, UNBROKEN, breaks_known
+from .heeding_kernels import hindering
 from .motions.motion_kernels import add_row, copy_pose, move, slope_row, solve
 
+NONE, POLYGONS, CONTACTS, WITNESS = 0, 1, 2, 3
+"""What a search for a witness came to."""
 SHARES = np.array([0.7, 0.9, 0.98, 1.0])
 """Of the bounds, that are aimed at in turn, ..."""
 STEPS = 10
@@ -30,38 +34,62 @@ LONGEST = 0.5
 
 
 @borrowing
-def seek_witness(faces, targets, contacts, model, rotation, translation, space):
-    """Move a pose to where it meets every bound.
+def seek_witness(faces, targets, contacts, model, known, heeding, rotation, translation, space):
+    """Move a pose to where it meets every bound, and breaks nothing that is known.
 
     Args:
         faces: (n,) the feature of each contact, below zero for none.
         targets: (n,) the polygon that stands for it.
         contacts: see `pose.kernel_contacts`.
         model: see `pose.ModelTest`.
+        known: see `known.Known`.
+        heeding: whether it counts.
         rotation: (3, 3) object to world, moved in place.
         translation: (3,) metres, likewise.
-        space: readings (see `reading_kernels.read`), (n, 3) places and normals in the object's
-            frame, and work space.
+        space: see `work_space.seeking_space`: readings (see `reading_kernels.read`), (n, 3)
+            places and normals in the object's frame, and work space.
 
     Returns:
-        Whether it does, on concave faces as they are; and whether it does on the polygons.
+        `WITNESS`; `CONTACTS`, if it met all bounds on contacts on the way; `POLYGONS`, if it met
+        those on the polygons; or `NONE`.
     """
-    readings, x, u, system, factor, gradient, step, _, _, _, spare, turned, shifted = space
+    readings, x, u, system, factor, gradient, step, row, turn, arm, spare = space[:11]
+    turned, shifted, places, heeded = space[11:]
     points, measured, _, _, _ = contacts
     count = len(faces)
-    on_hulls = False
+    found = NONE
+    amount = 2.0 * count
+    if heeding:
+        amount += len(known.corners) + len(known.starts)
+    for s in range(len(heeded)):
+        heeded[s] = False
     for share in SHARES:
         last, ends, shorter = np.inf, False, 0
         for _ in range(STEPS):
             carry(count, points, measured, rotation, translation, x, u)
             worst = read(count, faces, targets, x, u, model, contacts, readings)
             if worst <= 1.0 + EXACT:
-                on_hulls = True
+                found = max(found, POLYGONS)
                 if meets_all(count, faces, x, u, model, contacts, EXACT, spare):
-                    return True, True
-                if worst <= share:
+                    found = CONTACTS
+                    if not heeding:
+                        return WITNESS
+                    broken = breaks_known(
+                        faces, known, model, rotation, translation, heeded, places
+                    )
+                    if broken == UNBROKEN:
+                        return WITNESS
+                    if broken == ANEW:
+                        # More is asked for than before.
+                        last = np.inf
+                elif worst <= share:
                     break
             cost = exceeding(share, faces, contacts, model, space)
+            if heeding:
+                cost += hindering(
+                    *(share, faces, known, model, rotation, translation, heeded),
+                    ((system, gradient, row, turn, arm, spare), places),
+                )
             if cost < last:
                 ends, shorter = cost > STALLED * last, 0
                 last = cost
@@ -89,11 +117,11 @@ def seek_witness(faces, targets, contacts, model, rotation, translation, space):
         if last < np.inf:
             copy_pose(turned, shifted, rotation, translation)
             # A pose that meets all bounds exceeds no share of one by more than the rest of it.
-            if ends and last > 8.0 * count * (1.0 - share) ** 2 + 0.1:
+            if ends and last > 4.0 * amount * (1.0 - share) ** 2 + 0.1:
                 break
     carry(count, points, measured, rotation, translation, x, u)
     read(count, faces, targets, x, u, model, contacts, readings)
-    return False, on_hulls
+    return found
 
 
 @borrowing
@@ -103,7 +131,7 @@ def exceeding(share, faces, contacts, model, space):
     Returns:
         The sum.
     """
-    readings, x, u, system, _, gradient, _, row, turn, arm, spare, _, _ = space
+    readings, x, u, system, _, gradient, _, row, turn, arm, spare = space[:11]
     _, _, reaches, chords, sines = contacts
     gaps, lengths, _, _, kinds, misses, directions = readings
     centre, radius = model[5], model[6]

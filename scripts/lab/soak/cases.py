@@ -14,7 +14,7 @@ from ....envs.sensors.finger_sensor import FingerSensor
 from ....recognizer import SearchLimits
 from .paths import WatchedFinger
 
-CUT_SHORT = SearchLimits(budget=1, nodes=100)
+CUT_SHORT = SearchLimits(budget=2, nodes=100)
 """The recogniser gives up at once: what is left is the environment."""
 
 

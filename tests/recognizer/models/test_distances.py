@@ -14,8 +14,8 @@ from oracles.geometry import signed_distances
 from palpate.recognizer import Polyhedron
 from palpate.recognizer.models.distance_kernels import deepest, signed_distance
 from palpate.recognizer.models.features import all_features, face_features
+from palpate.recognizer.poses.breach_kernels import move_inside
 from palpate.recognizer.poses.fits.pose import ModelTest
-from palpate.recognizer.poses.surroundings.breach_kernels import move_inside
 
 Floats = NDArray[np.float64]
 
@@ -26,9 +26,9 @@ every_solid = pytest.mark.parametrize("name", [*SMALL, *OTHERS])
 def kernel_distances(model: Polyhedron, points: Floats) -> tuple[Floats, Floats]:
     """Signed distances (n,) and nearest points (n, 3) of the surface, from the kernels."""
     packed = ModelTest(model).model
-    nearest, near = np.empty((len(points), 3)), np.empty(3)
+    nearest = np.empty((len(points), 3))
     distances = [
-        signed_distance(point, packed, model.face_count, found, near)
+        signed_distance(point, packed, model.face_count, found)
         for point, found in zip(points, nearest, strict=True)
     ]
     return np.array(distances), nearest
@@ -79,12 +79,11 @@ def test_beside_the_lines_of_edges_and_faces_distances_keep_their_signs(name: st
 
 def test_edges_and_vertices_among_the_features_change_no_distance() -> None:
     model = SMALL["L-block"]
-    near, nearest = np.empty(3), np.empty(3)
+    nearest = np.empty(3)
     plain, rich = (ModelTest(model, of(model)).model for of in (face_features, all_features))
     for point in places_near(model, np.random.default_rng(2), 100):
         one, other = (
-            signed_distance(point, packed, model.face_count, nearest, near)
-            for packed in (plain, rich)
+            signed_distance(point, packed, model.face_count, nearest) for packed in (plain, rich)
         )
         assert one == other
 
@@ -103,7 +102,6 @@ def walk(
         ModelTest(model).model,
         model.face_count,
         place,
-        np.empty(3),
         np.empty(3),
         np.empty(3),
     )
@@ -201,6 +199,6 @@ def test_a_place_outside_is_not_taken_for_one_inside_that_has_to_leave() -> None
     ):
         place = CUBE.centroid.copy()
         place[2] = top + height
-        spaces = np.empty(3), np.empty(3), np.empty(3)
-        assert move_inside(place, clearance, model, CUBE.face_count, *spaces) == after
+        space = (*(np.empty(3) for _ in range(5)),)
+        assert move_inside(place, clearance, model, CUBE.face_count, space) == after
         assert (place[2] < top) == (after <= 0.0)

@@ -6,19 +6,25 @@ from functools import cache
 
 import numpy as np
 import pytest
+from helpers.scenes import KINDS, NAMES, Scene, probe
 from numpy.typing import NDArray
 from oracles.checker import check
 from oracles.proof_samples import Sample, direction, draw, rotation_near
 from scipy.optimize import linprog
 from scipy.spatial.transform import RigidTransform, Rotation
 
+from palpate.recognizer.contacts.support import StableFace
 from palpate.recognizer.poses.boxes_kernels import cayley, recentre
-from palpate.recognizer.poses.cover import work_space
+from palpate.recognizer.poses.cover import Aims, problem_of
 from palpate.recognizer.poses.first_box_kernels import ALL, IMPOSSIBLE, first_boxes
 from palpate.recognizer.poses.fits.pose import ModelTest
+from palpate.recognizer.poses.known import Surroundings, known_of
+from palpate.recognizer.poses.path_kernels import heed_paths
 from palpate.recognizer.poses.polytope_kernels import tighten
-from palpate.recognizer.poses.rows_kernels import contact_rows, extent, remainder
+from palpate.recognizer.poses.rows_kernels import contact_rows, extent, remainder, support_rows
 from palpate.recognizer.poses.shape import Shape, Touches, shape_of, touches_of
+from palpate.recognizer.poses.shrink_kernels import cut_rows
+from palpate.recognizer.poses.work_space import work_space
 
 Floats = NDArray[np.float64]
 CASES = 1_500
@@ -166,6 +172,63 @@ def test_a_pose_well_outside_its_bounds_breaks_a_row_of_a_small_box() -> None:
         rows = np.concatenate(rows_about(sample, turned, half, low, high))
         assert (rows[:, :6] @ pose - rows[:, 6] > 0.0).any(), case
     assert broken > CASES / 10
+
+
+@pytest.mark.parametrize("kind", ["free", "plane", "standing"])
+def test_what_free_paths_and_a_support_ask_holds_at_the_truth(kind: str) -> None:
+    rng = np.random.default_rng([8, list(KINDS).index(kind)])
+    asked, ruled_out, slacks = 0, 0, []
+    for case in range(CASES // 5):
+        scene = probe(NAMES[case % 3], rng, **KINDS[kind])
+        entry = scene.recognizer.library.solid(scene.model.name)
+        feet = [] if kind != "standing" else _stood_on(entry.stable_faces, scene)
+        surroundings = Surroundings.of(scene.free_space, scene.support)
+        known = known_of(scene.model, scene.contacts, surroundings, np.eye(3), feet)
+        aims = Aims(0, 1.0, 0.1, 0, 0.05, 0.05)
+        problem = problem_of(
+            *(entry.shape, entry.test.model, entry.packed, scene.contacts, 0, aims), known
+        )
+        work = work_space(len(scene.contacts), 3, problem.touches.mean, known)
+        inverse, radius = scene.pose.rotation.inv(), entry.shape.radius
+        shift = inverse.apply(problem.touches.mean - scene.pose.translation) / radius
+        for truth in (True, False):
+            size = rng.choice([0.002, 0.02, 0.2])
+            middle = rotation_near(inverse, size, rng)
+            between = middle.inv() * inverse
+            angle = max(between.magnitude(), 1e-300)
+            w = 2.0 * np.tan(angle / 2.0) / angle * between.as_rotvec()
+            room = rng.uniform(0.1, 1.0, 3) * size
+            aside = rng.uniform(-1.0, 1.0, 3) * room
+            if not truth:
+                # A box far from the truth may be ruled out; if none ever were, nothing was asked.
+                aside += rng.normal(size=3)
+            work.middle[:], work.half[:] = middle.as_matrix(), np.abs(w) * 1.2 + 1e-6
+            work.low[:3], work.high[:3] = -work.half, work.half
+            work.low[3:], work.high[3:] = shift + aside - room, shift + aside + room
+            work.rotation[:] = middle.inv().as_matrix()
+            work.translation[:] = problem.touches.mean - radius * middle.inv().apply(shift + aside)
+            work.cut_count[0] = 0
+            used = support_rows(-1, known, radius, work, 0) if scene.support else 0
+            possible = heed_paths(problem, work)
+            used = cut_rows(used, work)
+            if not truth:
+                ruled_out += not possible
+                continue
+            assert possible, f"case {case}: paths rule out the truth"
+            over = work.columns[:6, :used].T @ np.concatenate([w, shift]) - work.columns[6, :used]
+            assert (over <= 1e-8).all(), f"case {case}: a row loses the truth"
+            asked += used
+            slacks += (-over).tolist()
+    assert asked > 50
+    assert np.min(slacks) < 0.01
+    assert ruled_out > 20
+
+
+def _stood_on(faces: list[StableFace], scene: Scene) -> list[StableFace]:
+    """The face that a solid of a scene stands on."""
+    assert scene.support is not None
+    down = -scene.pose.rotation.inv().apply(scene.support.up)
+    return [max(faces, key=lambda face: float(face.normal @ down))]
 
 
 def _readings(sample: Sample, rotation: Floats, translation: Floats) -> tuple[Floats, float]:

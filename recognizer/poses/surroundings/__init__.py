@@ -1,1 +1,0 @@
-"""Poses held against free space, a support and approaches."""
