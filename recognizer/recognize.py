@@ -263,7 +263,7 @@ class Recognizer:
         entry = next(one for one in self.library.solids if one.model.name == only.object_name)
         resting = known.support is not None and known.support.resting
         return pin_down(
-            entry.test,
+            entry.kernel,
             only,
             contacts,
             self.tolerance,

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..contacts.contacts import Contacts
 from ..contacts.support import StableFace, SupportPlane
-from ..poses.fits.pose import ModelTest, kernel_contacts
+from ..poses.fits.pose import KernelModel, kernel_contacts
 from . import extent_kernels
 from .hypotheses import Hypothesis, PoseTolerance
 
@@ -24,7 +24,7 @@ ROUNDS = 3
 
 
 def pin_down(
-    test: ModelTest,
+    test: KernelModel,
     hypothesis: Hypothesis,
     contacts: Contacts,
     tolerance: PoseTolerance,
@@ -117,7 +117,7 @@ def _axes(covariance: Floats) -> Floats:
 
 
 def _support_rows(
-    test: ModelTest,
+    test: KernelModel,
     hypothesis: Hypothesis,
     turn: float,
     support: SupportPlane | None,

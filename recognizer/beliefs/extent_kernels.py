@@ -11,10 +11,10 @@ import numpy as np
 
 from ..compiling import borrowing, kernel
 from ..contacts.reading_kernels import UNKNOWN_NORMAL, carry, read, worst_on_pieces
+from ..poses.fits.fit_kernels import fit_space
 from ..poses.motions.motion_kernels import cross, move, perpendicular, slope_row, to_object
-from ..poses.proofs.polytope_kernels import all_within, box_of, take_needed
-from ..poses.proofs.proof_kernels import workspace
-from ..poses.proofs.simplex_kernels import simplex_space
+from ..poses.simplex_kernels import simplex_space
+from .reach_kernels import all_within, box_of, take_needed
 
 TANGENTS = 8
 """Half-planes about a cone of normals."""
@@ -118,10 +118,10 @@ def contact_rows(faces, contacts, errors, model, half_angles, x, u, turn, rows, 
 
 @kernel
 def strain(faces, contacts, model, rotation, translation):
-    """The largest reading of a pose, in bounds; arguments as in `pose_kernels.settle`."""
+    """The largest reading of a pose, in bounds; arguments as in `finish_kernels.finish`."""
     count = len(faces)
-    work = workspace(count)
-    readings, x, u = work[0], work[3][0], work[3][1]
+    space = fit_space(count)
+    readings, x, u = space.readings, space.x, space.u
     carry(count, contacts[0], contacts[1], rotation, translation, x, u)
     worst = read(count, faces, faces, x, u, model, contacts, readings)
     exact, _ = worst_on_pieces(count, faces, faces, x, model, contacts, readings)

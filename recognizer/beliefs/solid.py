@@ -6,14 +6,17 @@ from time import perf_counter
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import RigidTransform
+from scipy.spatial.transform import RigidTransform, Rotation
 
 from ..contacts.contacts import Contacts
-from ..poses.known import Surroundings
+from ..poses.fits.pose import kernel_contacts
+from ..poses.known import Surroundings, nothing_known
 from ..poses.solid import SolidEntry
 from ..poses.solid_search import Aim, find_poses
+from ..poses.work_space import seeking_space
 from ..tree.limits import SearchLimits
 from ..tree.tree import Constraints
+from .family_kernels import span_family
 from .hypotheses import Hypothesis, PoseTolerance, cluster
 from .search import Search
 
@@ -97,4 +100,18 @@ def span_solid(
     diameter = entry.model.diameter
     step = 0.5 * min(tolerance.distance(diameter, largest), tolerance.rotation * diameter / 2.0)
     faces = hypothesis.interpretations[0]
-    return entry.test.span(faces, contacts, hypothesis.pose, hypothesis.freedoms, step, most)
+    rotations, translations = np.empty((most, 3, 3)), np.empty((most, 3))
+    found = span_family(
+        faces.astype(np.int64),
+        kernel_contacts(contacts),
+        entry.kernel.model,
+        hypothesis.pose.rotation.as_matrix(),
+        np.array(hypothesis.pose.translation),
+        np.ascontiguousarray(hypothesis.freedoms),
+        step,
+        rotations,
+        translations,
+        (nothing_known(len(contacts)), seeking_space(len(contacts), 0)),
+    )
+    turns = Rotation.from_matrix(rotations[:found])
+    return RigidTransform.from_components(translations[:found], turns)

@@ -164,7 +164,7 @@ def read(count, faces, targets, x, u, model, contacts, readings):
         targets: (n,) the polygon that stands for that feature.
         x: (n, 3) contacts, object frame, metres.
         u: (n, 3) measured normals, object frame.
-        model: see `pose.ModelTest`.
+        model: see `pose.KernelModel`.
         contacts: likewise.
         readings: gaps (n, 3) from the nearest point of the feature; their lengths (n,); heights
             (n,); what is nearest (n,), see `polygon_kernels`; kinds (n,), misses (n,) and

@@ -47,7 +47,7 @@ def signed_distance(x, model, faces, nearest):
 
     Args:
         x: (3,) the point, object frame.
-        model: see `pose.ModelTest`.
+        model: see `pose.KernelModel`.
         faces: how many of its features are faces; they come first.
         nearest: (3,) the nearest point of the surface, written in place.
     """
@@ -101,7 +101,7 @@ def deepest(one, other, clearance, grain, bound, model, faces, place, point, nea
         clearance: how far it should stay away, metres; negative, how deep it may run.
         grain: the least step, metres.
         bound: radius about the model's centroid that holds the solid.
-        model: see `pose.ModelTest`.
+        model: see `pose.KernelModel`.
         faces: how many of its features are faces.
         place: (3,) the place found, written in place.
         point: (3,) work space.

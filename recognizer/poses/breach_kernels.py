@@ -82,7 +82,7 @@ def nearest_on_path(s, least, grain, known, model, rotation, translation, space)
         least: how far away it should be, metres; ...
         grain: ... if it is, nowhere is it nearer than this less than that.
         known: see `known.Known`.
-        model: see `pose.ModelTest`.
+        model: see `pose.KernelModel`.
         rotation: (3, 3) object to world.
         translation: (3,) metres.
         space: five (3,) arrays: the path's ends in the object's frame and the place are written

@@ -11,9 +11,9 @@ import numpy as np
 from ..compiling import borrowing, kernel
 from .boxes_kernels import gibbs_between, recentre, shift_of, turn_chart
 from .breach_kernels import UNBROKEN, breaks_known
-from .fits.pose_kernels import finish, weigh
+from .fits.finish_kernels import finish, weigh
+from .fits.fit_kernels import fit_space
 from .motions.motion_kernels import copy_pose
-from .proofs.proof_kernels import workspace
 
 ROUNDING = 1e-6
 """Of angles between rotations that are about the same, or about half a turn apart."""
@@ -212,7 +212,7 @@ def report_components(leaves, labels, found, problem, seeking):
     rotations, translations = np.zeros((found, 3, 3)), np.zeros((found, 3))
     costs, informations = np.zeros(found), np.zeros((found, 6, 6))
     proven, reaches = np.zeros(found, np.bool_), np.zeros((found, 2))
-    work, space = workspace(n), (np.empty((3, 3)), np.empty((3, 3)), np.empty(3))
+    work, space = fit_space(n), (np.empty((3, 3)), np.empty((3, 3)), np.empty(3))
     inverse, shift, features = np.empty((3, 3)), np.empty(3), np.empty(n, np.int64)
     chosen = np.full(found, -1, np.int64)
     for m in range(len(labels)):

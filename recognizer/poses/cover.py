@@ -73,7 +73,7 @@ class Problem(NamedTuple):
 
     shape: Shape
     model: Any
-    """See `pose.ModelTest`."""
+    """See `pose.KernelModel`."""
     contacts: Any
     """See `pose.kernel_contacts`."""
     touches: Touches
@@ -208,7 +208,7 @@ def problem_of(
 
     Args:
         shape: of its features.
-        model: likewise, see `pose.ModelTest`.
+        model: likewise, see `pose.KernelModel`.
         packed: ranges of its features, see `ranges.pack_tables`.
         contacts: at least one.
         switches: bits, which constraints on pairs to apply.

@@ -11,10 +11,12 @@ from __future__ import annotations
 import numpy as np
 
 from ..compiling import borrowing
-from .motions.align_kernels import ROUNDING, diagonalise, rotation_of
+from .motions.quaternion_kernels import diagonalise, rotation_of
 
 WIDE = 0.32
 """Squared sine of half an angle: the normals leave a turn about an axis open if they allow more."""
+ROUNDING = 1e-6
+"""Misfit of normals, in squared bounds, that is put down to rounding."""
 IMPOSSIBLE, ALL = -1, 3
 """Of turns that are open: no rotation is within the bounds; all are."""
 

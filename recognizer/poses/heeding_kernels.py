@@ -32,7 +32,7 @@ def hindering(share, faces, known, model, rotation, translation, heeded, space):
         share: of each bound that is aimed at.
         faces: (n,) the feature of each contact.
         known: see `known.Known`.
-        model: see `pose.ModelTest`.
+        model: see `pose.KernelModel`.
         rotation: (3, 3) object to world.
         translation: (3,) metres.
         heeded: (m,) the paths that count.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..compiling import borrowing
-from .proofs.simplex_kernels import farther, forget_vertex
+from .simplex_kernels import farther, forget_vertex
 
 ROUNDING = 1e-10
 """Room for rounding, as of a row."""

@@ -16,7 +16,7 @@ from ..models.permutations import feature_permutations
 from ..models.polyhedron import Polyhedron
 from ..tables.ranges import PairTables, pack_tables
 from ..tables.table_cache import cached_tables
-from .fits.pose import ModelTest
+from .fits.pose import KernelModel
 from .shape import Shape, shape_of
 
 Bits = NDArray[np.uint64]
@@ -30,7 +30,7 @@ class SolidEntry:
     model: Polyhedron
     features: Features
     tables: PairTables
-    test: ModelTest
+    kernel: KernelModel
     packed: NDArray[np.float64]
     """The tables as the kernels read them."""
 
@@ -49,12 +49,12 @@ class SolidEntry:
             if folder is None
             else cached_tables(model, folder, features=features if edges else None)
         )
-        return cls(model, features, tables, ModelTest(model, features), pack_tables(tables))
+        return cls(model, features, tables, KernelModel(model, features), pack_tables(tables))
 
     @cached_property
     def shape(self) -> Shape:
         """The features as the cover's kernels read them."""
-        return shape_of(self.features, self.test.radius)
+        return shape_of(self.features, self.kernel.radius)
 
     @cached_property
     def permutations(self) -> tuple[NDArray[np.int32], float]:
@@ -92,7 +92,9 @@ class SolidEntry:
             FOOTING * model.diameter,
         )
         tables = PairTables.of(model, features)
-        return SolidEntry(model, features, tables, ModelTest(model, features), pack_tables(tables))
+        return SolidEntry(
+            model, features, tables, KernelModel(model, features), pack_tables(tables)
+        )
 
 
 def bit_set(members: NDArray[np.integer], count: int) -> Bits:

@@ -100,6 +100,30 @@ def find_poses(
     return replace(found, poses=poses)
 
 
+def test_interpretations(
+    entry: SolidEntry, interpretations: NDArray[np.int32], contacts: Contacts, aim: Aim
+) -> Poses:
+    """A pose of each of some interpretations that isn't ruled out, in their order.
+
+    It is the best fit of one that meets every bound, if there is one.
+
+    Args:
+        entry: the solid.
+        interpretations: (m, n) a feature for each contact, -1 for none.
+        contacts: the n contacts.
+        aim: what to find out; none of these is looked for among others.
+    """
+    aim = replace(aim, outliers=int((interpretations < 0).sum(axis=1).max(initial=0)))
+    domains = _domains(entry, contacts, interpretations)
+    poses = _find(entry, contacts, aim, domains, Surroundings.of(None, None)).poses
+    best: dict[bytes, int] = {}
+    for row in np.lexsort((poses.costs, ~poses.proven)):
+        best.setdefault(poses.faces[row].tobytes(), int(row))
+    rows = np.ascontiguousarray(interpretations, np.int32)
+    kept = [best[row.tobytes()] for row in rows if row.tobytes() in best]
+    return poses.take(np.array(kept, np.intp))
+
+
 def _domains(entry: SolidEntry, contacts: Contacts, known: NDArray[np.int32] | None) -> Bits:
     """(n, w) the features that each contact may be on."""
     domains = entry.by_kind[contacts.kinds]
@@ -125,7 +149,7 @@ def _find(
         square: the feature that stands for the first, if the first contact says which it is.
     """
     upright, contacts = _upright(contacts)
-    shape, model = entry.shape, entry.test.model
+    shape, model = entry.shape, entry.kernel.model
     largest = float(contacts.position_error.max()) / shape.radius
     aims = Aims(
         spare=aim.outliers,

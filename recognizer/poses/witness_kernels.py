@@ -41,7 +41,7 @@ def seek_witness(faces, targets, contacts, model, known, heeding, rotation, tran
         faces: (n,) the feature of each contact, below zero for none.
         targets: (n,) the polygon that stands for it.
         contacts: see `pose.kernel_contacts`.
-        model: see `pose.ModelTest`.
+        model: see `pose.KernelModel`.
         known: see `known.Known`.
         heeding: whether it counts.
         rotation: (3, 3) object to world, moved in place.

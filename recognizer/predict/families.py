@@ -13,8 +13,10 @@ from ..beliefs.hypotheses import Hypothesis
 from ..contacts.contacts import Contacts
 from ..contacts.support import SupportPlane
 from ..poses.fits.pose import kernel_contacts
-from ..poses.fits.spread_kernels import DRAWS, LINES, spread_over_families
+from ..poses.known import nothing_known
 from ..poses.solid import SolidEntry
+from ..poses.work_space import seeking_space
+from .spread_kernels import DRAWS, LINES, spread_over_families
 
 SEED = 738
 """Of the random numbers, which are always the same: samples are a rule of the belief."""
@@ -113,7 +115,7 @@ def _spread(
     spread_over_families(
         faces,
         kernel_contacts(contacts),
-        entry.test.model,
+        entry.kernel.model,
         (np.ascontiguousarray(starts[:, :3, :3]), np.ascontiguousarray(starts[:, :3, 3])),
         motions,
         np.asarray(counts, np.int64),
@@ -121,5 +123,6 @@ def _spread(
         draws,
         rotations,
         positions,
+        (nothing_known(len(contacts)), seeking_space(len(contacts), 0)),
     )
     return rotations, positions

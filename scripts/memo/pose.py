@@ -65,7 +65,7 @@ def memo_pose(
 ) -> RigidTransform | None:
     """The pose of an interpretation, model to world (Section 3).
 
-    Whether it meets any bound isn't looked at: that is the memo's model test, and `pose.ModelTest`.
+    Whether it meets any bound isn't looked at: that is the memo's model test.
 
     Args:
         model: the object.

@@ -50,7 +50,7 @@ def _measure(spec: Spec, rng: np.random.Generator) -> tuple[Floats, bool]:
     truth = sense_grid(thing.model, rng)
     contacts = truth.noisy(spec.noise(), rng)
     pruned, prune_seconds = timed(prune, thing.tables, contacts)
-    poses, test_seconds = timed(thing.test.run, pruned.faces, contacts)
+    poses, test_seconds = timed(thing.test, pruned.faces, contacts)
     _, seconds = timed(_recognizer(spec.object_name).recognize, contacts)
     kept = bool((poses.faces == truth.faces).all(axis=1).any())
     counts = len(pruned.faces), len(poses)

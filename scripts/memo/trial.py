@@ -8,6 +8,9 @@ from functools import cache
 from itertools import chain
 from typing import TYPE_CHECKING, Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
 from ...assets import memo
 from .coarse import MemoPoses, memo_poses
 from .groups import count_transforms
@@ -17,7 +20,8 @@ if TYPE_CHECKING:
     from ...envs.sensors.grid import TrueContacts
     from ...envs.sensors.noise import SensorNoise
     from ...recognizer import Contacts, PairTables, Polyhedron
-    from ...recognizer.poses.fits.pose import ModelTest
+    from ...recognizer.poses.fits.pose import Poses
+    from ...recognizer.poses.solid import SolidEntry
 
 Stage = Literal["tree", "test", "memo"]
 """How far to go: the tree alone, the model test and transforms too, the memo's own test besides."""
@@ -84,22 +88,39 @@ class TrialCounts:
 
 @dataclass(frozen=True, eq=False)
 class Prepared:
-    """An object with its tables and its model test."""
+    """An object with what is built of it once."""
 
-    model: Polyhedron
-    tables: PairTables
-    test: ModelTest
+    entry: SolidEntry
+
+    @property
+    def model(self) -> Polyhedron:
+        """The object."""
+        return self.entry.model
+
+    @property
+    def tables(self) -> PairTables:
+        """Its range tables."""
+        return self.entry.tables
+
+    def test(self, interpretations: NDArray[np.int32], contacts: Contacts) -> Poses:
+        """The model test: those of some interpretations that a pose satisfies, with one each."""
+        from ...recognizer import Constraints, PoseTolerance, SearchLimits
+        from ...recognizer.poses.solid_search import Aim, test_interpretations
+
+        tolerance, error = PoseTolerance(), float(contacts.position_error.max())
+        shift = tolerance.distance(self.model.diameter, error)
+        aim = Aim(Constraints(), SearchLimits(), tolerance.rotation, shift)
+        return test_interpretations(self.entry, interpretations, contacts, aim)
 
 
 @cache
 def prepared(object_name: str) -> Prepared:
     """An object of the library, once a process."""
     from ...envs.library import load_library
-    from ...recognizer import PairTables
-    from ...recognizer.poses.fits.pose import ModelTest
+    from ...recognizer.poses.solid import SolidEntry
 
     model = next(model for model in load_library() if model.name == object_name)
-    return Prepared(model, PairTables.of(model), ModelTest(model))
+    return Prepared(SolidEntry.of(model, edges=False, folder=None))
 
 
 def run_stages(
@@ -125,7 +146,7 @@ def count_stages(
     kept = bool((left.faces == truth.faces).all(axis=1).any())
     if stage == "tree":
         return TrialCounts(len(contacts), len(left.faces), kept, left.complete)
-    poses = thing.test.run(left.faces, contacts)
+    poses = thing.test(left.faces, contacts)
     kept = bool((poses.faces == truth.faces).all(axis=1).any())
     return TrialCounts(
         len(contacts),

@@ -2,12 +2,44 @@
 
 from __future__ import annotations
 
+from typing import Any, NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from ...compiling import borrowing, kernel
 from ...contacts.reading_kernels import ARC, NO_CONE, carry, read
 from ...models.polygon_kernels import CORNER, INSIDE
 from ..motions.motion_kernels import add_row, move, slope_row, solve
+
+
+class FitSpace(NamedTuple):
+    """Work space of a fit to n contacts."""
+
+    readings: Any
+    """See `reading_kernels.read`."""
+    x: NDArray[np.float64]
+    """(n, 3) contacts in the object's frame, ..."""
+    u: NDArray[np.float64]
+    """... (n, 3) and their normals."""
+    vectors: tuple[NDArray[np.float64], ...]
+    """(6,) and four of (3,)."""
+
+
+@kernel
+def fit_space(count):
+    """Work space of a fit to so many contacts."""
+    readings = (
+        np.empty((count, 3)),
+        np.empty(count),
+        np.empty(count),
+        np.zeros(count, np.int64),
+        np.zeros(count, np.int64),
+        np.zeros(count),
+        np.zeros((count, 3)),
+    )
+    vectors = (np.empty(6), np.empty(3), np.empty(3), np.empty(3), np.empty(3))
+    return FitSpace(readings, np.empty((count, 3)), np.empty((count, 3)), vectors)
 
 
 @borrowing
@@ -22,7 +54,7 @@ def _along_edge(corners, first, along):
 
 
 @borrowing
-def assemble_fit(bounded, count, faces, x, u, model, contacts, readings, system, gradient, space):
+def assemble_fit(bounded, count, faces, x, u, model, contacts, readings, system, gradient, vectors):
     """Normal equations of the least-squares misfit at one pose; returns the misfit.
 
     Each contact counts its height above the plane of its face, how far beyond its bound it lies
@@ -36,18 +68,18 @@ def assemble_fit(bounded, count, faces, x, u, model, contacts, readings, system,
         faces: (n,) the feature of each contact, -1 for none.
         x: (n, 3) contacts, object frame.
         u: (n, 3) measured normals, object frame.
-        model: see `pose.ModelTest`.
+        model: see `pose.KernelModel`.
         contacts: likewise.
         readings: see `reading_kernels.read`, which must have run.
         system: (6, 6) lower triangle written in place.
         gradient: (6,) written in place.
-        space: vectors of `proof_kernels.barrier_workspace`.
+        vectors: of `FitSpace`.
     """
     normals, start, centre, radius = model[0], model[3], model[5], model[6]
     _, _, reaches, chords, sines = contacts
     gaps, lengths, heights, regions, kinds, misses, directions = readings
     corners = model[4]
-    row, along, _, turn, arm, direction = space
+    row, along, turn, arm, direction = vectors
     system[:] = 0.0
     gradient[:] = 0.0
     cost = 0.0
@@ -115,7 +147,7 @@ def assemble_fit(bounded, count, faces, x, u, model, contacts, readings, system,
 
 
 @kernel
-def fit_pose(count, faces, contacts, model, most, rotation, translation, work):
+def fit_pose(count, faces, contacts, model, most, rotation, translation, space):
     """Damped Gauss-Newton from a starting pose, in place; returns the misfit.
 
     The damping holds the pose still along a freedom that no contact bears on, so that it does not
@@ -129,9 +161,9 @@ def fit_pose(count, faces, contacts, model, most, rotation, translation, work):
         most: the most steps.
         rotation: (3, 3) object to world.
         translation: (3,) object to world, metres.
-        work: see `proof_kernels.workspace`.
+        space: see `FitSpace`.
     """
-    readings, space = work[0], work[8][2]
+    readings, vectors = space.readings, space.vectors
     points, normals, reaches = contacts[0], contacts[1], contacts[2]
     centre, radius = model[5], model[6]
     x = np.empty((count, 3))
@@ -148,7 +180,7 @@ def fit_pose(count, faces, contacts, model, most, rotation, translation, work):
     carry(count, points, normals, rotation, translation, x, u)
     read(count, faces, faces, x, u, model, contacts, readings)
     cost = assemble_fit(
-        True, count, faces, x, u, model, contacts, readings, system, gradient, space
+        True, count, faces, x, u, model, contacts, readings, system, gradient, vectors
     )
     # As if half a diameter were known of every freedom: nothing beside any real bound.
     least = 1.0 / (radius * radius)
@@ -170,7 +202,7 @@ def fit_pose(count, faces, contacts, model, most, rotation, translation, work):
         read(count, faces, faces, x, u, model, contacts, readings)
         trial = assemble_fit(
             *(True, count, faces, x, u, model, contacts, readings, trial_system, trial_gradient),
-            space,
+            vectors,
         )
         if trial <= cost:
             gain = cost - trial

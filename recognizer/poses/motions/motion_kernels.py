@@ -148,3 +148,21 @@ def move(rotation, translation, step, centre, radius, new_rotation, new_translat
         new_rotation[i, 1] = r0 * t01 + r1 * t11 + r2 * t21
         new_rotation[i, 2] = r0 * t02 + r1 * t12 + r2 * t22
         new_translation[i] = translation[i] + r0 * s0 + r1 * s1 + r2 * s2
+
+
+@borrowing
+def turn_between(one, other, turn):
+    """The rotation vector of ``one^T other`` into (3,) ``turn``; returns its length, radians."""
+    trace = 0.0
+    for k in range(3):
+        a, b = (k + 1) % 3, (k + 2) % 3
+        turn[k] = 0.0
+        for i in range(3):
+            turn[k] += 0.5 * (one[i, b] * other[i, a] - one[i, a] * other[i, b])
+            trace += one[i, k] * other[i, k]
+    sine = np.sqrt(turn[0] ** 2 + turn[1] ** 2 + turn[2] ** 2)
+    angle = np.arctan2(sine, 0.5 * (trace - 1.0))
+    if sine > 1e-9:
+        for k in range(3):
+            turn[k] *= angle / sine
+    return angle

@@ -58,7 +58,7 @@ def measure_errors(piece: Trials[Spec]) -> Errors:
         truth = sense_grid(thing.model, rng)
         contacts = truth.noisy(noise, rng)
         angles[row] = math.degrees(truth.T_world_object.rotation.magnitude())
-        fitted = thing.test.run(truth.faces[None], contacts)
+        fitted = thing.test(truth.faces[None], contacts)
         kept = (prune(thing.tables, contacts).faces == truth.faces).all(axis=1).any()
         lost += not (kept and len(fitted))
         poses = {METHODS[0]: memo_pose(thing.model, truth.faces, contacts)}

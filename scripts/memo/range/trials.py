@@ -155,7 +155,7 @@ def interpret(
     """
     thing = prepared(OBJECT_NAME)
     pruned = prune(thing.tables, contacts)
-    poses = thing.test.run(pruned.faces, contacts)
+    poses = thing.test(pruned.faces, contacts)
     error = float(contacts.position_error.max())
     hypotheses, weights = cluster(view.model, poses, PoseTolerance(), error)
     kept = bool((poses.faces == view.faces).all(axis=1).any())

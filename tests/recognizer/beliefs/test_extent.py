@@ -8,9 +8,9 @@ from scipy.spatial.transform import RigidTransform, Rotation
 
 from palpate.recognizer import Polyhedron, Recognizer, pose_difference
 from palpate.recognizer.beliefs import extent_kernels as kernels
+from palpate.recognizer.beliefs import reach_kernels
 from palpate.recognizer.poses.fits.pose import kernel_contacts
-from palpate.recognizer.poses.proofs import polytope_kernels
-from palpate.recognizer.poses.proofs.simplex_kernels import farther, farthest, simplex_space
+from palpate.recognizer.poses.simplex_kernels import farther, farthest, simplex_space
 
 BOX = 0.02
 SIDES = np.full(6, BOX)
@@ -76,7 +76,7 @@ def test_inequalities_that_all_of_a_box_meets_say_nothing():
         low, high = np.full(6, -BOX), np.full(6, BOX)
         reach = farthest(objective, *_known(rows, limits))
         columns = np.empty((7, len(rows)))
-        left = polytope_kernels.take_needed(rows, limits, len(rows), low, high, columns)
+        left = reach_kernels.take_needed(rows, limits, len(rows), low, high, columns)
         dropped += len(rows) - left
         known = columns[:6, :left].T, columns[6, :left]
         assert farthest(objective, *_known(*known)) == pytest.approx(reach, abs=1e-8)
@@ -98,13 +98,13 @@ def test_three_motions_are_within_what_is_allowed_if_no_direction_reaches_beyond
         rows, limits = _polytope(rng)
         axes = np.zeros((3, 6))
         axes[:, first : first + 3] = Rotation.random(rng=rng).as_matrix()
-        box = polytope_kernels.box_of(axes, *_known(rows, limits))
+        box = reach_kernels.box_of(axes, *_known(rows, limits))
         objectives = np.zeros((len(directions), 6))
         objectives[:, first : first + 3] = directions
         reach = max(_linprog(one, rows, limits) for one in objectives)
         block = axes[:, first : first + 3].copy()
         for allowed in (0.9 * reach, 1.3 * reach):
-            within = polytope_kernels.all_within(first, block, box, allowed, *_known(rows, limits))
+            within = reach_kernels.all_within(first, block, box, allowed, *_known(rows, limits))
             # Sixty directions see nearly how far it reaches, and never farther.
             assert within == (allowed > reach)
             answers.append(within)
@@ -112,7 +112,7 @@ def test_three_motions_are_within_what_is_allowed_if_no_direction_reaches_beyond
 
 
 def _test_of(model: Polyhedron):
-    return Recognizer([model]).library.solids[0].test
+    return Recognizer([model]).library.solids[0].kernel
 
 
 @pytest.mark.parametrize("name", list(SMALL))

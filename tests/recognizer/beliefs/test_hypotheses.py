@@ -7,13 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trimesh
+from helpers.fitting import Fitter
 from helpers.sensing import exact, feel, touch_faces
 from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from palpate.recognizer import Contacts, Polyhedron, PoseTolerance, Recognizer
 from palpate.recognizer.beliefs.hypotheses import Hypothesis, cluster
-from palpate.recognizer.poses.fits.pose import ModelTest, Poses
+from palpate.recognizer.poses.fits.pose import Poses
 
 CUBE = Polyhedron.from_mesh(trimesh.creation.box((0.04, 0.04, 0.04)), name="cube")
 
@@ -194,7 +195,7 @@ def hypothesis_of(
 ) -> tuple[Hypothesis, Contacts]:
     touches = touch_faces(model, np.random.default_rng(seed), faces)
     contacts = exact(touches) if contacts is None else contacts
-    poses = ModelTest(model).run(touches.faces[None], contacts)
+    poses = Fitter(model).run(touches.faces[None], contacts)
     hypotheses, _ = cluster(model, poses, PoseTolerance(), 1e-4)
     assert len(hypotheses) == 1
     return hypotheses[0], contacts
@@ -271,7 +272,7 @@ def test_what_a_freedom_is_depends_on_the_tolerance() -> None:
     rng = np.random.default_rng(5)
     touches = touch_faces(CUBE, rng, faces_along(CUBE, "xyz" * 4))
     contacts = feel(touches, rng, 0.001, 0.2)
-    poses = ModelTest(CUBE).run(touches.faces[None], contacts)
+    poses = Fitter(CUBE).run(touches.faces[None], contacts)
     for tolerance, determined in (
         (PoseTolerance(rotation=0.5, translation=0.5), True),
         (PoseTolerance(rotation=1e-4, translation=1e-4, position_errors=1e-4), False),

@@ -6,11 +6,12 @@ from collections import Counter
 
 import numpy as np
 import pytest
+from helpers.fitting import Fitter
 from helpers.sensing import CUBE
 from numpy.typing import NDArray
 from oracles.checker import check
 from oracles.geometry import angle_between, cone_angles, triangle_distances
-from oracles.proof_samples import direction, draw, read_at, start_near
+from oracles.samples import direction, draw, read_at, start_near
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from palpate.recognizer import Contacts
@@ -20,6 +21,7 @@ from palpate.recognizer.contacts.reading_kernels import (
     NO_CONE,
     RAY,
     cone_support,
+    meets_all,
     nearest_in_cone,
     nearest_on_arc,
     nearest_on_feature,
@@ -27,7 +29,6 @@ from palpate.recognizer.contacts.reading_kernels import (
 )
 from palpate.recognizer.models.features import all_features
 from palpate.recognizer.models.polygon_kernels import CORNER, EDGE, INSIDE, nearest_in_polygon
-from palpate.recognizer.poses.fits.pose import ModelTest
 
 Floats = NDArray[np.float64]
 
@@ -166,7 +167,7 @@ def test_two_contacts_farther_apart_than_an_edge_is_long_are_not_both_on_it() ->
         position_error=1e-4,
         normal_error=0.02,
     )
-    poses = ModelTest(CUBE, features).run(np.full((1, 2), edge, np.int32), contacts)
+    poses = Fitter(CUBE, features).run(np.full((1, 2), edge, np.int32), contacts)
     assert len(poses) == 0
 
 
@@ -175,9 +176,11 @@ def test_a_pose_reads_as_the_checker_reads_it() -> None:
     for _ in range(200):
         sample = draw(rng)
         _, rotation, translation = start_near(sample, rng, rng.choice([0.1, 1.0]))
-        work, worst = read_at(sample, rotation, translation)
+        space, worst = read_at(sample, rotation, translation)
         count, faces, _, model, contacts = sample.question
-        farthest, _ = worst_on_pieces(count, faces, faces, work[3][0], model, contacts, work[0])
+        farthest, _ = worst_on_pieces(
+            *(count, faces, faces, space.x, model, contacts, space.readings)
+        )
         pose = RigidTransform.from_components(translation, Rotation.from_matrix(rotation))
         found = check(sample.model, pose, sample.contacts, sample.faces, features=sample.features)
         shares = found.distances / sample.contacts.position_error
@@ -187,3 +190,19 @@ def test_a_pose_reads_as_the_checker_reads_it() -> None:
         angles, bounds = found.angles, sample.contacts.normal_error
         chords = np.sin(0.5 * angles) / np.sin(0.5 * bounds)
         assert worst <= max(shares.max(), chords.max(), (angles / bounds).max()) * (1.0 + 1e-6)
+
+
+def test_bounds_are_all_met_where_no_reading_is_above_its_own() -> None:
+    rng, met, cases = np.random.default_rng(31), 0, 1500
+    for _ in range(cases):
+        sample = draw(rng)
+        _, rotation, translation = start_near(sample, rng, rng.choice([1e-9, 0.01, 0.3]))
+        translation = sample.true_translation + rng.normal(size=3) * rng.choice([0.0, 1e-3])
+        space, worst = read_at(sample, rotation, translation)
+        count, faces, targets, model, contacts = sample.question
+        x, u, spare = space.x, space.u, np.empty(3)
+        exact, _ = worst_on_pieces(count, faces, targets, x, model, contacts, space.readings)
+        within = meets_all(count, faces, x, u, model, contacts, 1e-9, spare)
+        assert within == (max(worst, exact) <= 1.0 + 1e-9)
+        met += within
+    assert 0.2 * cases < met < 0.8 * cases

@@ -15,7 +15,7 @@ from palpate.recognizer import Polyhedron
 from palpate.recognizer.models.distance_kernels import deepest, signed_distance
 from palpate.recognizer.models.features import all_features, face_features
 from palpate.recognizer.poses.breach_kernels import move_inside
-from palpate.recognizer.poses.fits.pose import ModelTest
+from palpate.recognizer.poses.fits.pose import KernelModel
 
 Floats = NDArray[np.float64]
 
@@ -25,7 +25,7 @@ every_solid = pytest.mark.parametrize("name", [*SMALL, *OTHERS])
 
 def kernel_distances(model: Polyhedron, points: Floats) -> tuple[Floats, Floats]:
     """Signed distances (n,) and nearest points (n, 3) of the surface, from the kernels."""
-    packed = ModelTest(model).model
+    packed = KernelModel(model).model
     nearest = np.empty((len(points), 3))
     distances = [
         signed_distance(point, packed, model.face_count, found)
@@ -80,7 +80,7 @@ def test_beside_the_lines_of_edges_and_faces_distances_keep_their_signs(name: st
 def test_edges_and_vertices_among_the_features_change_no_distance() -> None:
     model = SMALL["L-block"]
     nearest = np.empty(3)
-    plain, rich = (ModelTest(model, of(model)).model for of in (face_features, all_features))
+    plain, rich = (KernelModel(model, of(model)).model for of in (face_features, all_features))
     for point in places_near(model, np.random.default_rng(2), 100):
         one, other = (
             signed_distance(point, packed, model.face_count, nearest) for packed in (plain, rich)
@@ -99,7 +99,7 @@ def walk(
         clearance,
         grain,
         bound,
-        ModelTest(model).model,
+        KernelModel(model).model,
         model.face_count,
         place,
         np.empty(3),
@@ -189,7 +189,7 @@ def test_a_path_through_a_hole_meets_its_walls_at_their_distance() -> None:
 
 
 def test_a_place_outside_is_not_taken_for_one_inside_that_has_to_leave() -> None:
-    model = ModelTest(CUBE).model
+    model = KernelModel(CUBE).model
     top = CUBE.vertices[:, 2].max()
     for height, clearance, after in (
         (1e-5, -1e-6, 1.0),

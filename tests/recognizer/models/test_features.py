@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from oracles import solids as oracles
 from oracles.checker import cone_of
 from oracles.geometry import cone_angles, windings
-from oracles.proof_samples import direction
+from oracles.samples import direction
 
 from palpate.recognizer import Polyhedron
 from palpate.recognizer.models.features import Features, all_features, face_features

@@ -8,7 +8,7 @@ from helpers.sensing import INCH, SMALL, feel, forget_normals, touch_faces
 from numpy.typing import NDArray
 from oracles import solids as oracles
 from oracles.checker import check
-from oracles.proof_samples import draw
+from oracles.samples import draw
 from scipy.optimize import least_squares
 from scipy.spatial.transform import RigidTransform, Rotation
 
@@ -52,7 +52,7 @@ def cover_of(
     turns = 3 if (contacts.normal_error > 1.0).all() else 0
     aims = Aims(spare, 1.0, max(5.0 * largest, 0.1), turns, 0.05, max(0.02, 2.0 * largest))
     problem = problem_of(
-        entry.shape, entry.test.model, entry.packed, contacts, Constraints().bits, aims
+        entry.shape, entry.kernel.model, entry.packed, contacts, Constraints().bits, aims
     )
     domains = entry.by_kind[contacts.kinds]
     if faces is not None:

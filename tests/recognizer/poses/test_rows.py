@@ -9,7 +9,7 @@ import pytest
 from helpers.scenes import KINDS, NAMES, Scene, probe
 from numpy.typing import NDArray
 from oracles.checker import check
-from oracles.proof_samples import Sample, direction, draw, rotation_near
+from oracles.samples import Sample, direction, draw, rotation_near
 from scipy.optimize import linprog
 from scipy.spatial.transform import RigidTransform, Rotation
 
@@ -17,7 +17,7 @@ from palpate.recognizer.contacts.support import StableFace
 from palpate.recognizer.poses.boxes_kernels import cayley, recentre
 from palpate.recognizer.poses.cover import Aims, problem_of
 from palpate.recognizer.poses.first_box_kernels import ALL, IMPOSSIBLE, first_boxes
-from palpate.recognizer.poses.fits.pose import ModelTest
+from palpate.recognizer.poses.fits.pose import KernelModel
 from palpate.recognizer.poses.known import Surroundings, known_of
 from palpate.recognizer.poses.path_kernels import heed_paths
 from palpate.recognizer.poses.polytope_kernels import tighten
@@ -90,12 +90,12 @@ def test_a_box_seen_from_its_own_middle_holds_all_its_rotations() -> None:
 
 
 @cache
-def shape_for(test: ModelTest) -> Shape:
+def shape_for(test: KernelModel) -> Shape:
     return shape_of(test.features, test.radius)
 
 
 def read_by_kernels(sample: Sample) -> tuple[Shape, Touches]:
-    return shape_for(sample.test), touches_of(sample.contacts, sample.test.radius)
+    return shape_for(sample.kernel), touches_of(sample.contacts, sample.kernel.radius)
 
 
 def rows_about(
@@ -186,7 +186,7 @@ def test_what_free_paths_and_a_support_ask_holds_at_the_truth(kind: str) -> None
         known = known_of(scene.model, scene.contacts, surroundings, np.eye(3), feet)
         aims = Aims(0, 1.0, 0.1, 0, 0.05, 0.05)
         problem = problem_of(
-            *(entry.shape, entry.test.model, entry.packed, scene.contacts, 0, aims), known
+            *(entry.shape, entry.kernel.model, entry.packed, scene.contacts, 0, aims), known
         )
         work = work_space(len(scene.contacts), 3, problem.touches.mean, known)
         inverse, radius = scene.pose.rotation.inv(), entry.shape.radius

@@ -9,15 +9,16 @@ import numpy as np
 import pytest
 from helpers.beliefs import interpretations_of
 from helpers.constraints import NAMES, only
+from helpers.fitting import Fitter
 from helpers.sensing import INCH, SMALL, feel, forget_normals, sense_grid, touch_features
 from numpy.typing import NDArray
 from oracles import solids as oracles
 from oracles.checker import check
-from oracles.proof_samples import STAND_INS, TESTS, draw
+from oracles.samples import STAND_INS, TESTS, draw
 
 from palpate.recognizer import Belief, Contacts, PairTables, Polyhedron, Recognizer, SearchLimits
 from palpate.recognizer.models.features import Features, all_features, face_features
-from palpate.recognizer.poses.fits.pose import ModelTest, kernel_contacts
+from palpate.recognizer.poses.fits.pose import kernel_contacts
 from palpate.recognizer.tables.ranges import pack_tables
 from palpate.recognizer.tree.mask_kernels import narrow, pair_readings
 from palpate.recognizer.tree.tree import prune
@@ -79,7 +80,7 @@ def test_pairs_of_edges_and_vertices_that_were_touched_go_together() -> None:
     tests = [test for _, test in TESTS]
     for _ in range(60):
         sample = draw(rng, 2, 6)
-        tables = packed[tests.index(sample.test)]
+        tables = packed[tests.index(sample.kernel)]
         for chosen in (*((name,) for name in NAMES), NAMES):
             switches = only(chosen).bits
             found = pairs_that_fit(sample.features, tables, sample.contacts, (0, 1), switches)
@@ -102,7 +103,7 @@ def recognized(
 def test_the_search_finds_what_the_tree_and_the_model_test_find(name: str) -> None:
     # Of the cube it looks at one of the symmetric copies only; of the others, at poses early.
     model, rng = (SMALL | STAND_INS)[name], np.random.default_rng(15)
-    tables, test = PairTables.of(model), ModelTest(model)
+    tables, test = PairTables.of(model), Fitter(model)
     for case in range(2):
         touches = (
             sense_grid(model, rng, 5, 16)
@@ -133,7 +134,7 @@ def test_a_search_over_edges_and_vertices_finds_what_trying_all_of_them_finds(
     model, rng = SMALL[name], np.random.default_rng(16)
     features = all_features(model)
     packed = pack_tables(PairTables.of(model, features))
-    test = ModelTest(model, features, boxes=5, pool=10**7)
+    test = Fitter(model, features, nodes=10_000)
     touches = touch_features(model, features, rng, count)
     contacts = feel(touches, rng, 0.0002, 0.02)
     rows = np.zeros((1, 0), np.int32)
@@ -153,7 +154,7 @@ def test_a_search_without_normals_finds_what_the_tree_and_the_model_test_find(
     name: str, crowd: int
 ) -> None:
     model, rng = SMALL[name], np.random.default_rng(21)
-    tables, test = PairTables.of(model), ModelTest(model, boxes=5, pool=10**7)
+    tables, test = PairTables.of(model), Fitter(model, nodes=10_000)
     touches = touch_features(model, test.features, rng, 5)
     contacts = forget_normals(feel(touches, rng, 0.0005, 0.1), np.arange(5) != 0)
     poses = test.run(prune(tables, contacts).faces, contacts)

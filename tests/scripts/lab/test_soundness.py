@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from helpers.fitting import Fitter
 from helpers.sensing import INCH, feel, sense_grid
 from scipy.spatial.transform import RigidTransform
 
@@ -28,7 +29,6 @@ from palpate.recognizer import (
     Recognizer,
     SupportPlane,
 )
-from palpate.recognizer.poses.fits.pose import ModelTest
 from palpate.recognizer.tree.tree import prune
 from palpate.scripts.lab.soundness import __main__ as soundness
 from palpate.scripts.lab.soundness.case import Case
@@ -56,9 +56,9 @@ every_row = pytest.mark.parametrize(
 
 
 @cache
-def prepared(name: str) -> tuple[Polyhedron, PairTables, ModelTest]:
+def prepared(name: str) -> tuple[Polyhedron, PairTables, Fitter]:
     model = Polyhedron.from_mesh(mesh_path(name), name=name)
-    return model, PairTables.of(model), ModelTest(model)
+    return model, PairTables.of(model), Fitter(model)
 
 
 def lost(row: tuple[str, int, float], seed: int, cases: int, tested: int) -> list[str]:

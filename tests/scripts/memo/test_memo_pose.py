@@ -7,12 +7,12 @@ import math
 
 import numpy as np
 import pytest
+from helpers.fitting import Fitter
 from helpers.sensing import CUBE, HOLED, L_BLOCK, exact, feel, random_pose, sense_grid, touch_faces
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from palpate.envs.library import load_library
 from palpate.recognizer import Polyhedron
-from palpate.recognizer.poses.fits.pose import ModelTest
 from palpate.scripts.memo.pose import (
     ALONG,
     CLUSTER,
@@ -186,7 +186,7 @@ def test_a_noisy_half_turn_is_found_though_its_angle_may_be_on_either_side():
 
 def test_the_joint_fit_is_far_more_accurate_on_the_same_contacts():
     rng, model = np.random.default_rng(8), MODELS["housing"]
-    test, errors = ModelTest(model), []
+    test, errors = Fitter(model), []
     for _ in range(20):
         touches = sense_grid(model, rng, 12, 20)
         contacts = feel(touches, rng, 2.54e-4, np.pi / 10)

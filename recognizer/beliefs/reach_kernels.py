@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...compiling import borrowing, kernel
-from .simplex_kernels import farther, forget_vertex
+from ..compiling import borrowing, kernel
+from ..poses.simplex_kernels import farther, forget_vertex
 
 CUTS = 24
 """Planes that are cut off the shadow of a polytope; one that takes more counts as too long."""

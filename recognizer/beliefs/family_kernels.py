@@ -4,20 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...compiling import borrowing, kernel
-from ...contacts.reading_kernels import carry, read, worst_on_pieces
-from ..motions.motion_kernels import move
-from ..proofs.proof_kernels import workspace
-from .feasibility_kernels import seek_feasible
-from .verdict_kernels import EXACT
-
-
-@borrowing
-def _meets(count, faces, contacts, model, rotation, translation, x, u, readings):
-    carry(count, contacts[0], contacts[1], rotation, translation, x, u)
-    worst = read(count, faces, faces, x, u, model, contacts, readings)
-    exact, _ = worst_on_pieces(count, faces, faces, x, model, contacts, readings)
-    return max(worst, exact) <= 1.0 + EXACT
+from ..compiling import borrowing, kernel
+from ..poses.motions.motion_kernels import move
+from ..poses.witness_kernels import WITNESS, seek_witness
 
 
 @borrowing
@@ -47,6 +36,7 @@ def span_family(
     step,
     rotations,
     translations,
+    seeking,
 ):
     """Poses that meet all bounds, a step apart along given motions, spreading from a first one.
 
@@ -60,22 +50,20 @@ def span_family(
         step: length of a step, metres.
         rotations: (k, 3, 3) written in place; k is the most poses.
         translations: (k, 3) likewise.
+        seeking: that nothing else is known, and work space, see `witness_kernels.seek_witness`.
 
     Returns:
         How many poses were written.
     """
-    count, most, ways = len(faces), len(rotations), len(motions)
-    work = workspace(count)
-    readings = work[0]
+    most, ways = len(rotations), len(motions)
     places = np.zeros((most, ways), np.int64)
     new_place = np.empty(ways, np.int64)
     along = np.empty(6)
     turned = np.empty((3, 3))
     shifted = np.empty(3)
-    x = np.empty((count, 3))
-    u = np.empty((count, 3))
     rotations[0] = rotation
     translations[0] = translation
+    nothing, space = seeking
     found = 1
     at = 0
     while at < found and found < most:
@@ -102,24 +90,12 @@ def span_family(
                 shifted,
             )
             # A curved family leaves its tangent: a nudge brings the pose back into the bounds.
-            seek_feasible(
-                count,
-                faces,
-                faces,
-                contacts,
-                model,
-                20,
-                False,
-                turned,
-                np.pi,
-                turned,
-                shifted,
-                work,
+            found_one = seek_witness(
+                *(faces, faces, contacts, model, nothing, False, turned, shifted, space)
             )
             # At the family's end it brings it back to where it came from: no new pose.
             moved = _moved(rotations[at], translations[at], turned, shifted, model)
-            meets = _meets(count, faces, contacts, model, turned, shifted, x, u, readings)
-            if meets and moved > 0.5 * step:
+            if found_one == WITNESS and moved > 0.5 * step:
                 places[found] = new_place
                 rotations[found] = turned
                 translations[found] = shifted

@@ -1,4 +1,4 @@
-"""What proofs are tested on: solids that are touched, and poses from which kernels are asked."""
+"""What is tested on: solids that are touched, and poses from which kernels are asked."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ from palpate.envs.library import load_library
 from palpate.recognizer import Contacts, Polyhedron
 from palpate.recognizer.contacts.reading_kernels import carry, read
 from palpate.recognizer.models.features import Features, all_features
-from palpate.recognizer.poses.fits.pose import KernelContacts, ModelTest, kernel_contacts
-from palpate.recognizer.poses.proofs.proof_kernels import workspace
+from palpate.recognizer.poses.fits.fit_kernels import FitSpace, fit_space
+from palpate.recognizer.poses.fits.pose import KernelContacts, KernelModel, kernel_contacts
 
 Floats = NDArray[np.float64]
 Question = tuple[int, NDArray[np.int64], NDArray[np.int64], Any, KernelContacts]
@@ -29,14 +29,14 @@ STAND_INS = {model.name: model for model in load_library()}
 class Sample:
     """A model that is touched, with contacts that meet their bounds at its true pose."""
 
-    test: ModelTest
+    kernel: KernelModel
     model: Polyhedron
     touches: Touches
     contacts: Contacts
 
     @property
     def features(self) -> Features:
-        return self.test.features
+        return self.kernel.features
 
     @property
     def faces(self) -> NDArray[np.int64]:
@@ -58,7 +58,7 @@ class Sample:
     def question(self) -> Question:
         """What most kernels ask first: count, features, their polygons, model, contacts."""
         contacts = kernel_contacts(self.contacts)
-        return len(self.contacts), self.faces, self.faces, self.test.model, contacts
+        return len(self.contacts), self.faces, self.faces, self.kernel.model, contacts
 
     def passes(self, rotation: Floats, translation: Floats) -> bool:
         pose = RigidTransform.from_components(translation, Rotation.from_matrix(rotation))
@@ -71,14 +71,10 @@ class Sample:
         return bool((pieces == 1).all())
 
 
-def hasty(model: Polyhedron, features: Features | None = None) -> ModelTest:
-    return ModelTest(model, features, boxes=20, pool=10**6)
-
-
 TESTS = [
-    *((model, hasty(model)) for model in (*SMALL.values(), *STAND_INS.values())),
+    *((model, KernelModel(model)) for model in (*SMALL.values(), *STAND_INS.values())),
     *(
-        (model, hasty(model, all_features(model)))
+        (model, KernelModel(model, all_features(model)))
         for model in (*SMALL.values(), STAND_INS["stapler"], STAND_INS["simple-hand"])
     ),
 ]
@@ -135,22 +131,10 @@ def start_near(
     return ball, rotation, sample.true_translation + away
 
 
-def read_at(sample: Sample, rotation: Floats, translation: Floats) -> tuple[Any, float]:
+def read_at(sample: Sample, rotation: Floats, translation: Floats) -> tuple[FitSpace, float]:
     """Work space of the kernels with a pose read, and the largest reading in bounds."""
     count, faces, targets, model, contacts = sample.question
-    work = workspace(count)
-    x, u = work[3][0], work[3][1]
+    space = fit_space(count)
+    x, u = space.x, space.u
     carry(count, contacts[0], contacts[1], rotation, translation, x, u)
-    return work, read(count, faces, targets, x, u, model, contacts, work[0])
-
-
-def motion_to(sample: Sample, rotation: Floats, translation: Floats, pivot: Floats) -> Floats:
-    """(6,) z = (w, s) from a pose to the true one: x' = exp(-w) (x - pivot) + pivot - s."""
-    true_rotation, true_translation = sample.true_rotation, sample.true_translation
-    w = Rotation.from_matrix(rotation.T @ true_rotation).as_rotvec()
-    s = pivot - (rotation @ pivot + translation - true_translation) @ true_rotation
-    x = (sample.contacts.positions - translation) @ rotation
-    moved = (x - pivot) @ Rotation.from_rotvec(w).as_matrix() + pivot - s
-    there = (sample.contacts.positions - true_translation) @ true_rotation
-    assert np.abs(moved - there).max() < 1e-9
-    return np.concatenate([w, s])
+    return space, read(count, faces, targets, x, u, model, contacts, space.readings)

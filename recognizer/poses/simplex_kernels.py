@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...compiling import borrowing, kernel, vectorised
+from ..compiling import borrowing, kernel, vectorised
 
 PIVOTS = 60
 """The most of a program."""

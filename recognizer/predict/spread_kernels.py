@@ -1,7 +1,7 @@
 """Compiled samples of the poses that an interpretation allows: few, and far apart.
 
 Each starts with a jump from a known pose along the open motions, as long as the family is wide; the
-barrier method brings it back inside all bounds (see `feasibility_kernels`), and if it can't, the
+search for a witness brings it back inside all bounds (see `witness_kernels`), and if it can't, the
 sample before is gone on from. That may be the rim, so hit-and-run steps follow (Smith 1984): along
 a random line, to a point drawn from what of it is inside the bounds, found by drawing and shrinking
 (Neal 2003, slice sampling, Section 4.1). Lines are drawn by the local information of the contacts,
@@ -12,15 +12,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...compiling import borrowing, kernel
-from ...contacts.reading_kernels import UNKNOWN_NORMAL, carry, meets_all
-from ..motions.motion_kernels import add_row, copy_pose, move, slope_row
-from ..proofs.proof_kernels import workspace
-from .feasibility_kernels import seek_feasible
-from .verdict_kernels import EXACT, FEASIBLE
+from ..compiling import borrowing, kernel
+from ..contacts.reading_kernels import UNKNOWN_NORMAL, carry, meets_all
+from ..poses.motions.motion_kernels import add_row, copy_pose, move, slope_row
+from ..poses.witness_kernels import EXACT, WITNESS, seek_witness
 
-NEWTON = 30
-"""The most steps of the barrier method."""
 LINES = 8
 """Hit-and-run steps after a jump."""
 DRAWS = 10
@@ -32,7 +28,7 @@ WIDTH = 6.0
 @borrowing
 def _allowed(count, faces, contacts, model, rotation, translation, work):
     """Whether a pose meets all bounds."""
-    x, u, spare = work[3][0], work[3][1], work[5][2]
+    x, u, spare = work[1], work[2], work[10]
     carry(count, contacts[0], contacts[1], rotation, translation, x, u)
     return meets_all(count, faces, x, u, model, contacts, EXACT, spare)
 
@@ -42,7 +38,7 @@ def _draw_line(count, faces, contacts, model, rotation, translation, normal, lin
     """A motion drawn from the local normal law of the pose: ``L^-T normal``, into (6,) ``line``."""
     points, measured, reaches, chords, _ = contacts
     normals, centre, radius = model[0], model[5], model[6]
-    x, u = work[3][0], work[3][1]
+    x, u = work[1], work[2]
     system, factor, row, gradient, arm, turn = space
     carry(count, points, measured, rotation, translation, x, u)
     system[:] = 0.0
@@ -91,7 +87,7 @@ def _walk(count, faces, contacts, model, draws, rotation, translation, poses, sp
         translation: (3,) likewise.
         poses: (3, 3) and (3,) work space.
         space: of `_draw_line`, and the line (6,) and a part of it (6,).
-        work: see `proof_kernels.workspace`.
+        work: see `work_space.seeking_space`.
     """
     centre, radius = model[5], model[6]
     turned, shifted = poses
@@ -119,7 +115,7 @@ def _walk(count, faces, contacts, model, draws, rotation, translation, poses, sp
 
 @kernel
 def spread_over_families(
-    faces, contacts, model, starts, motions, counts, jumps, draws, rotations, translations
+    faces, contacts, model, starts, motions, counts, jumps, draws, rotations, translations, seeking
 ):
     """Poses that meet all bounds, spread over what each of some interpretations leaves open.
 
@@ -134,9 +130,10 @@ def spread_over_families(
         draws: (k, LINES, 7 + DRAWS) random numbers, see `_walk`.
         rotations: (k, 3, 3) written in place.
         translations: (k, 3) likewise.
+        seeking: that nothing else is known, and work space, see `witness_kernels.seek_witness`.
     """
     count = faces.shape[1]
-    work = workspace(count)
+    nothing, work = seeking
     along, turned, shifted = np.empty(6), np.empty((3, 3)), np.empty(3)
     poses = np.empty((3, 3)), np.empty(3)
     vectors = np.empty(6), np.empty(6), np.empty(3), np.empty(3), np.empty(6), np.empty(6)
@@ -153,13 +150,10 @@ def spread_over_families(
                 for k in range(6):
                     along[a] += jumps[row, k] * motions[h, k, a]
             move(rotation, translation, along, model[5], model[6], turned, shifted)
-            verdict = seek_feasible(
-                *(count, faces[h], faces[h], contacts, model, NEWTON, False, turned, np.pi),
-                *(turned, shifted, work),
+            found = seek_witness(
+                *(faces[h], faces[h], contacts, model, nothing, False, turned, shifted, work)
             )
-            if verdict != FEASIBLE or not _allowed(
-                count, faces[h], contacts, model, turned, shifted, work
-            ):
+            if found != WITNESS:
                 copy_pose(rotations[row - 1], translations[row - 1], turned, shifted)
             if sound:
                 _walk(

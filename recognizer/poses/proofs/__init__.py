@@ -1,1 +1,0 @@
-"""Proofs that no pose in a region of rotations meets every bound."""
