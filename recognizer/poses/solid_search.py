@@ -28,8 +28,9 @@ COARSE, COARSEST = 5.0, 0.1
 """How far turns about a box's axis may move contacts when their features are tried: in bounds on
 positions, and at least so many radii. Features of wider boxes are mostly left by what rules out
 nothing."""
-FEW = 3
-"""Contacts up to which, this not included, features are chosen before rotations."""
+FEW, SOME = 3, 8
+"""Contacts up to which, this not included, features are chosen before rotations; the same, where
+all normals are known."""
 ROUNDING = 1e-12
 """Of a cosine."""
 
@@ -253,12 +254,13 @@ def _upright(contacts: Contacts) -> tuple[Floats, Contacts]:
 def _open_turns(contacts: Contacts) -> int:
     """How many turns normals may leave open of the rotations in which features are tried.
 
-    None where all normals are known, or two lean apart: what a contact is on says more of a pose
-    than a rotation, and what leaves a family of poses is told as it is. All three where no normal
-    is known, and one, about an axis, where those that are may all be parallel.
+    None where contacts are few, or two of their normals lean apart: what a contact is on says more
+    of a pose than a rotation, and what leaves a family of poses is told as it is. All three where
+    no normal is known, and one, about an axis, where those that are may all be parallel: many
+    contacts on many parallel faces have too many ways to be tried before a turn is.
     """
     known = contacts.normal_error < math.pi / 2.0
-    if known.all() or len(contacts) < FEW:
+    if len(contacts) < (SOME if known.all() else FEW):
         return 0
     if not known.any():
         return 3
