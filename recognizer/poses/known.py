@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from ..contacts.contacts import APPROACH_ERROR, Contacts
 from ..contacts.free_space import FreeSpace
-from ..contacts.support import StableFace, SupportPlane, hull_corners
-from ..models.polyhedron import Polyhedron
+from ..contacts.support import StableFace, SupportPlane
+from .solid import SolidEntry
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -94,7 +94,7 @@ def nothing_known(count: int) -> Known:
 
 
 def known_of(
-    model: Polyhedron,
+    entry: SolidEntry,
     contacts: Contacts,
     surroundings: Surroundings,
     upright: Floats,
@@ -104,7 +104,7 @@ def known_of(
     """What is known, as the kernels read it.
 
     Args:
-        model: the solid.
+        entry: the solid.
         contacts: what was felt, turned by ``upright``.
         surroundings: what is known besides, not turned.
         upright: (3, 3) a rotation of the world.
@@ -112,9 +112,11 @@ def known_of(
             contact's feature; or the only one, if ``square`` is `NOWHERE`.
         square: the feature that stands for the plane of the first.
     """
-    known, free, support = nothing_known(len(contacts)), surroundings.free_space, None
+    known, free, model = nothing_known(len(contacts)), surroundings.free_space, entry.model
+    if surroundings.says_nothing(contacts):
+        return known
     known = known._replace(
-        anything=not surroundings.says_nothing(contacts),
+        anything=True,
         fronts=-contacts.approaches,
         leasts=np.where(contacts.approach_known, -np.sin(APPROACH_ERROR), -1.0),
         starts=np.ascontiguousarray(free.starts @ upright.T),
@@ -128,7 +130,7 @@ def known_of(
     support = surroundings.support
     if support is None:
         return known
-    corners = hull_corners(model)
+    corners = entry.corners
     low, high = support.height - support.error, support.height + support.error
     known = known._replace(
         up=upright @ support.up,

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..contacts.support import FOOTING, StableFace, stable_faces
+from ..contacts.support import FOOTING, StableFace, hull_corners, stable_faces
 from ..models.features import Features, all_features, face_features, with_squares
 from ..models.permutations import feature_permutations
 from ..models.polyhedron import Polyhedron
@@ -73,6 +73,11 @@ class SolidEntry:
         ends = (0, faces, faces + self.features.edge_count, count)
         spans = [(0, count), *pairwise(ends)]
         return np.array([bit_set(np.arange(*span), count) for span in spans])
+
+    @cached_property
+    def corners(self) -> NDArray[np.float64]:
+        """(v, 3) the corners of its convex hull, object frame, metres."""
+        return hull_corners(self.model)
 
     @cached_property
     def stable_faces(self) -> list[StableFace]:

@@ -160,7 +160,7 @@ def _find(
         turn=aim.turn,
         shift=aim.shift / shape.radius,
     )
-    known = known_of(entry.model, contacts, surroundings, upright, feet, square)
+    known = known_of(entry, contacts, surroundings, upright, feet, square)
     problem = problem_of(*(shape, model, entry.packed, contacts, aim.constraints.bits, aims), known)
     cover = search_cover(
         problem, domains, most_nodes=aim.limits.nodes, most_found=aim.limits.budget
