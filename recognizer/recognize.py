@@ -13,17 +13,17 @@ from scipy.spatial.transform import RigidTransform
 
 from .belief import Belief
 from .beliefs.extent import pin_down
-from .beliefs.hypotheses import Hypothesis, PoseTolerance, canonical
+from .beliefs.hypotheses import ACROSS, Hypothesis, PoseTolerance, canonical
 from .beliefs.library import Library
-from .beliefs.outline import PlanarEntry, search_polygon, span_polygon
+from .beliefs.model_search import search_model, span_hypothesis
 from .beliefs.search import Search
-from .beliefs.solid import search_solid, span_solid
 from .contacts.contacts import EDGE, Contacts
 from .contacts.free_space import FreeSpace
 from .contacts.support import SupportPlane
 from .models.features import Features
 from .models.polygon import Polygon
 from .models.polyhedron import Polyhedron
+from .poses.entry import SolidEntry
 from .poses.known import Surroundings
 from .tables.ranges import PairTables
 from .tree.limits import SearchLimits
@@ -78,7 +78,6 @@ class Recognizer:
         self.dimension = self.library.dimension
         self.tolerance = tolerance or PoseTolerance()
         self.limits = limits or SearchLimits()
-        self._spans = np.array([model.diameter for model in self.models])
 
     def tables(self, name: str) -> PairTables:
         """The range tables of a solid.
@@ -113,9 +112,7 @@ class Recognizer:
             A stack of poses, model to world, the hypothesis's own first.
         """
         entry = self.library.entry(hypothesis.object_name)
-        if isinstance(entry, PlanarEntry):
-            return span_polygon(entry, hypothesis, contacts, self.tolerance, most)
-        return span_solid(entry, hypothesis, contacts, self.tolerance, most)
+        return span_hypothesis(entry, hypothesis, contacts, self.tolerance, most)
 
     def limited(self, limits: SearchLimits) -> Recognizer:
         """The same with other limits; nothing is built again."""
@@ -146,13 +143,12 @@ class Recognizer:
 
         Raises:
             ValueError: no contacts, contacts of the plane for a library of solids or the other way
-                round, outliers below zero or in the plane, free space or a support in the plane.
+                round, outliers below zero, free space or a support in the plane.
         """
         if not len(contacts):
             raise ValueError("no contacts: before the first touch every object and pose fits")
         self._check(contacts, outliers)
-        if self.dimension == 2 and (free_space is not None or support is not None):
-            raise ValueError("free space and support are for solids, not for outlines of the plane")
+        self._check_known(free_space, support)
         known = Surroundings.of(free_space, support)
         return self._believe(contacts, spread_order(contacts), outliers, known, None)
 
@@ -171,12 +167,11 @@ class Recognizer:
                 belief about another library.
         """
         self._check(contacts, belief.outliers)
+        self._check_known(free_space, None)
         if not self.library.alike(belief.library):
             raise ValueError("this belief is about another library than the recogniser's")
         first = len(belief.contacts)
         everything = Contacts.join([belief.contacts, contacts])
-        if self.dimension == 2:
-            return self.recognize(everything, free_space=free_space)
         paths = FreeSpace.join([belief.free_space, free_space or FreeSpace.none()])
         known = Surroundings.of(paths, belief.support)
         # Without outliers an interpretation of all contacts is one of the first ones, extended.
@@ -202,8 +197,10 @@ class Recognizer:
             )
         if outliers < 0:
             raise ValueError(f"outliers is {outliers}; it must be zero or more")
-        if outliers and self.dimension == 2:
-            raise ValueError("outliers are not supported for outlines of the plane")
+
+    def _check_known(self, free_space: FreeSpace | None, support: SupportPlane | None) -> None:
+        if self.dimension == 2 and (free_space is not None or support is not None):
+            raise ValueError("free space and support are for solids, not for outlines of the plane")
 
     def _believe(
         self,
@@ -218,15 +215,12 @@ class Recognizer:
         span = least_span(ordered.positions, ordered.position_error) if outliers == 0 else 0.0
         hypotheses: list[Hypothesis] = []
         logs, searches = [], []
-        for entry in self.library.outlines:
-            found = search_polygon(entry, ordered, self.constraints, self.tolerance, self.limits)
-            _note(found, hypotheses, logs, searches)
-        for entry, diameter in zip(self.library.solids, self._spans, strict=False):
+        for entry in self.library.entries:
             # Memo, Section 7: no two contacts are farther apart than the object is wide.
-            if span > diameter * (1.0 + 1e-9):
+            if span > entry.body.diameter * (1.0 + 1e-9):
                 searches.append(Search.none(entry.model.name))
                 continue
-            found = search_solid(
+            found = search_model(
                 entry,
                 ordered,
                 self.constraints,
@@ -245,7 +239,7 @@ class Recognizer:
             hypotheses[index].ranked(float(weights[index]), back)
             for index in canonical(hypotheses, weights, nulls)
         ]
-        if len(ranked) == 1 and ranked[0].determined and self.models:
+        if len(ranked) == 1 and ranked[0].determined:
             ranked = [self._pinned(ranked[0], contacts, known)]
         return Belief(
             tuple(ranked),
@@ -260,16 +254,18 @@ class Recognizer:
 
     def _pinned(self, only: Hypothesis, contacts: Contacts, known: Surroundings) -> Hypothesis:
         """The only hypothesis left, determined only if all its poses are alike."""
-        entry = next(one for one in self.library.solids if one.model.name == only.object_name)
+        entry = self.library.entry(only.object_name)
         resting = known.support is not None and known.support.resting
+        stable = entry.stable_faces if resting and isinstance(entry, SolidEntry) else None
         return pin_down(
             entry.kernel,
             only,
-            contacts,
+            entry.in_space(contacts),
             self.tolerance,
             movable=known.says_nothing(contacts),
             support=known.support,
-            stable=entry.stable_faces if resting else None,
+            stable=stable,
+            held=ACROSS if entry.flat else (),
         )
 
 

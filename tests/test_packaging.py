@@ -34,7 +34,7 @@ MAY_IMPORT = {
 ROOMS = {
     "recognizer": (
         *("models", "contacts", "tables", "tree"),
-        *("poses.motions", "poses.fits", "poses.planar"),
+        *("poses.motions", "poses.fits"),
         *("beliefs", "predict", "advice"),
     ),
     "envs": ("collision", "scene", "sensors", "pictures", "planar"),

@@ -6,6 +6,7 @@ which the contacts allow is farther from it than the pose tolerance.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -32,6 +33,7 @@ def pin_down(
     movable: bool = True,
     support: SupportPlane | None = None,
     stable: list[StableFace] | None = None,
+    held: Sequence[int] = (),
 ) -> Hypothesis:
     """Move a pose to the middle of those that its contacts allow; open it if they reach too far.
 
@@ -47,6 +49,7 @@ def pin_down(
         movable: whether the pose may be moved, as nothing else is known that it has to meet.
         support: what the object lies on, if it is known.
         stable: the faces it can stand on, if it rests there.
+        held: which of the six small motions there are none.
 
     Returns:
         The hypothesis, its pose moved if that is still a witness, and with freedoms if some pose
@@ -74,7 +77,7 @@ def pin_down(
             turn,
             axes,
             allowed,
-            *_support_rows(test, hypothesis, turn, support, stable),
+            *_more_rows(held, *_support_rows(test, hypothesis, turn, support, stable)),
         )
         if alike:
             return replace(
@@ -106,6 +109,13 @@ def pin_down(
             break
     far = np.abs(box).max(axis=1) / np.repeat(allowed, 3)
     return replace(hypothesis, freedoms=axes[far >= min(1.0, far.max())])
+
+
+def _more_rows(held: Sequence[int], rows: Floats, limits: Floats) -> tuple[Floats, Floats]:
+    """The rows and, before them, that some motions are none; see `extent_kernels.contact_rows`."""
+    none = np.eye(6)[list(held)]
+    rows = np.concatenate([none, -none, rows])
+    return rows, np.concatenate([np.zeros(2 * len(none)), limits])
 
 
 def _axes(covariance: Floats) -> Floats:

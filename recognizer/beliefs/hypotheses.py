@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform
 
 from ..models.polyhedron import Polyhedron
+from ..models.prism import Prism
 from ..poses.fits.pose import Poses
 from .hypothesis_kernels import weigh_poses
 
@@ -26,6 +27,11 @@ Floats = NDArray[np.float64]
 ROUNDED = 4
 """Decimals that the order of hypotheses looks at: of a weight's logarithm and of a pose. A best fit
 ends with its misfit's last digits, which leaves half as many of the pose, and a few to spare."""
+
+ACROSS = (0, 1, 5)
+"""Of small motions: the two turns and the shift that leave the plane."""
+HELD = 1e-3
+"""What is left of a motion that is held, as a share of what counts as fixed."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,9 +78,9 @@ class Hypothesis:
     """Whether ``pose`` meets every bound; if not, no such pose was found and none excluded."""
     farthest_turn: float = np.inf
     """No pose that it stands for is turned from ``pose`` by more, radians, but for the object's own
-    symmetries; infinite in the plane, where that isn't known."""
+    symmetries."""
     farthest_shift: float = np.inf
-    """Of none is the object's centroid farther away, metres; likewise."""
+    """Of none is the object's centroid farther away, metres."""
 
     def __getstate__(self) -> dict[str, Any]:
         # SciPy normalises a pickled pose anew, which changes its last bits; it is made again.
@@ -112,7 +118,7 @@ class Hypothesis:
 
 
 def cluster(
-    model: Polyhedron, poses: Poses, tolerance: PoseTolerance, position_error: float
+    model: Polyhedron | Prism, poses: Poses, tolerance: PoseTolerance, position_error: float
 ) -> tuple[list[Hypothesis], Floats]:
     """Group one object's poses into hypotheses.
 
@@ -136,6 +142,10 @@ def cluster(
         return [], np.zeros(0)
     radius = model.diameter / 2.0
     most_shift = tolerance.distance(model.diameter, position_error)
+    # Three standard deviations of each motion, against what the tolerance allows it: with bounded
+    # noise hardly any fit is off by more.
+    allowed = min(tolerance.rotation * radius, most_shift)
+    prior, held = _known_before(model, radius, allowed)
     members, starts, matrices, covariances, log_weights, motions, loose, far = weigh_poses(
         (
             *(poses.rotations, poses.translations, poses.costs, poses.informations),
@@ -143,13 +153,15 @@ def cluster(
         ),
         model.centroid,
         model.symmetries,
-        radius,
+        prior,
         tolerance.rotation,
         most_shift,
-        # Three standard deviations of each motion, against what the tolerance allows it: with
-        # bounded noise hardly any fit is off by more.
-        min(tolerance.rotation * radius, most_shift),
+        allowed,
     )
+    # What is held has no volume.
+    log_weights += 0.5 * np.log(prior[held]).sum()
+    covariances[:, held] = covariances[:, :, held] = 0.0
+    motions[:, held] = 0.0
     hypotheses = []
     for group, (start, end) in enumerate(pairwise(starts.tolist())):
         rows = members[start:end]
@@ -167,6 +179,20 @@ def cluster(
             )
         )
     return hypotheses, log_weights
+
+
+def _known_before(
+    model: Polyhedron | Prism, radius: float, allowed: float
+) -> tuple[Floats, NDArray[np.intp]]:
+    """(6,) information about each motion before the first touch, and which motions there are none.
+
+    Half a turn and half a diameter are known of any; an outline is only moved in its plane, to a
+    thousandth of what counts as fixed.
+    """
+    prior = np.repeat([1.0 / (np.pi * radius) ** 2, 1.0 / radius**2], 3)
+    held = np.array(ACROSS if isinstance(model, Prism) else (), np.intp)
+    prior[held] = (HELD * allowed) ** -2
+    return prior, held
 
 
 def canonical(

@@ -58,7 +58,7 @@ def group_poses(rotations, centres, symmetries, most_turn, most_shift):
 
 
 @kernel
-def weigh_poses(poses, centre, symmetries, radius, most_turn, most_shift, allowed):
+def weigh_poses(poses, centre, symmetries, known, most_turn, most_shift, allowed):
     """Group poses, and weigh each group by the volumes of its poses; see `hypotheses.cluster`.
 
     Args:
@@ -67,7 +67,7 @@ def weigh_poses(poses, centre, symmetries, radius, most_turn, most_shift, allowe
             `pose.Poses`.
         centre: (3,) the object's centroid, object frame, metres.
         symmetries: (g, 3, 3) the object's rotations onto itself.
-        radius: half the object's diameter, metres.
+        known: (6,) information about small motions beforehand, inverse square metres.
         most_turn: largest angle within a group, radians.
         most_shift: largest shift within a group, metres.
         allowed: what three standard deviations of a motion may be for it to count as fixed, metres.
@@ -91,9 +91,8 @@ def weigh_poses(poses, centre, symmetries, radius, most_turn, most_shift, allowe
     motions, loose = np.empty((count, 6, 6)), np.empty((count, 6), np.bool_)
     shares = np.empty(count)
     prior = np.zeros((6, 6))
-    for k in range(3):
-        prior[k, k] = 1.0 / (np.pi * radius) ** 2
-        prior[3 + k, 3 + k] = 1.0 / radius**2
+    for k in range(6):
+        prior[k, k] = known[k]
     for g in range(found):
         for at in range(starts[g], starts[g + 1]):
             row = members[at]

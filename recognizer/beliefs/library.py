@@ -8,8 +8,7 @@ from pathlib import Path
 
 from ..models.polygon import Polygon
 from ..models.polyhedron import Polyhedron
-from ..poses.solid import SolidEntry
-from .outline import PlanarEntry
+from ..poses.entry import OutlineEntry, SolidEntry
 
 
 @dataclass(frozen=True, eq=False)
@@ -17,7 +16,7 @@ class Library:
     """Solids or outlines, prepared; a belief holds it, so that its poses can be looked at."""
 
     solids: tuple[SolidEntry, ...]
-    outlines: tuple[PlanarEntry, ...]
+    outlines: tuple[OutlineEntry, ...]
     edges: bool
     """Whether contacts may lie on edges and vertices of solids too."""
 
@@ -54,9 +53,14 @@ class Library:
             raise ValueError("features 'all' is for solids; outlines have edges alone")
         return cls(
             tuple(SolidEntry.of(model, edges=edges, folder=cache) for model in solids),
-            tuple(PlanarEntry.of(model) for model in outlines),
+            tuple(OutlineEntry.of(model) for model in outlines),
             edges,
         )
+
+    @property
+    def entries(self) -> tuple[SolidEntry | OutlineEntry, ...]:
+        """All models, in the order in which they were given."""
+        return (*self.solids, *self.outlines)
 
     @property
     def dimension(self) -> int:
@@ -75,21 +79,20 @@ class Library:
             ValueError: no solid of that name.
         """
         entry = self.entry(name)
-        if isinstance(entry, PlanarEntry):
+        if isinstance(entry, OutlineEntry):
             raise ValueError(f"{name!r} is an outline; it has edges alone, and planar tables")
         return entry
 
-    def entry(self, name: str) -> SolidEntry | PlanarEntry:
+    def entry(self, name: str) -> SolidEntry | OutlineEntry:
         """A model with all that was built of it.
 
         Raises:
             ValueError: no model of that name.
         """
-        everything = (*self.solids, *self.outlines)
-        for entry in everything:
+        for entry in self.entries:
             if entry.model.name == name:
                 return entry
-        known = ", ".join(entry.model.name for entry in everything)
+        known = ", ".join(entry.model.name for entry in self.entries)
         raise ValueError(f"no model is called {name!r}; there are: {known}")
 
     def alike(self, other: Library) -> bool:
@@ -97,8 +100,6 @@ class Library:
         if self is other:
             return True
         first, second = (
-            [(e.model.name, len(e.features)) for e in each.solids]
-            + [(e.model.name, e.tables.face_count) for e in each.outlines]
-            for each in (self, other)
+            [(e.model.name, len(e.features)) for e in each.entries] for each in (self, other)
         )
         return first == second

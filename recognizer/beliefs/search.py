@@ -11,8 +11,8 @@ class Search:
 
     object_name: str
     nodes: int
-    """Nodes of the tree that were looked at: of a solid boxes of poses, with the features that are
-    left to each contact; of an outline interpretations of the first contacts."""
+    """Nodes of the tree that were looked at: boxes of poses, with the features that are left to
+    each contact."""
     tried: int
     """How often a pose was sought that meets every bound."""
     tested: int

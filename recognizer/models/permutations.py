@@ -1,4 +1,4 @@
-"""Where the symmetries of a solid take its features."""
+"""Where the symmetries of a model take its features."""
 
 from __future__ import annotations
 
@@ -8,18 +8,21 @@ from scipy.spatial import KDTree
 
 from .features import Features
 from .polyhedron import Polyhedron
+from .prism import Prism
 
 
-def feature_permutations(model: Polyhedron, features: Features) -> tuple[NDArray[np.int32], float]:
-    """Where the symmetries of a solid take its features.
+def feature_permutations(
+    model: Polyhedron | Prism, features: Features
+) -> tuple[NDArray[np.int32], float]:
+    """Where the symmetries of a model take its features.
 
     Args:
-        model: the solid.
+        model: the solid, or an outline.
         features: its faces, or its edges and vertices too.
 
     Returns:
         (g, f) the image of each feature under each symmetry, the identity first; and the farthest,
-        metres, that any symmetry takes a corner or a normal, at the solid's size, off its image.
+        metres, that any symmetry takes a corner or a normal, at the model's size, off its image.
     """
     turns, size = model.symmetries, model.diameter
     images = np.empty((len(turns), len(features)), np.int32)

@@ -75,13 +75,32 @@ def overlap(one, other, leaves, middles, halves, angles, space):
     return True
 
 
+@borrowing
+def within(at, leaves, rotation, shift, g):
+    """Whether a pose, world to object, with a shift in radii, is in a leaf's box."""
+    for k in range(3):
+        if not leaves.rooms[at, k, 0] <= shift[k] <= leaves.rooms[at, k, 1]:
+            return False
+    if not gibbs_between(leaves.charts[at], rotation, g):
+        return False
+    inside = True
+    for k in range(3):
+        inside &= leaves.lows[at, k] <= g[k] <= leaves.highs[at, k]
+    return inside
+
+
 @kernel
-def link_leaves(leaves, interpretations):
+def link_leaves(leaves, interpretations, mean, radius):
     """Number the components of a cover.
+
+    A witness may lie beside the box that it was found from: where another box holds it, the two are
+    of one component.
 
     Args:
         leaves: see `cover.Leaves`.
         interpretations: (m,) the interpretation of each leaf, as a number.
+        mean: (3,) of the contacts, metres.
+        radius: metres.
 
     Returns:
         (m,) the component of each leaf, numbered as they come, and how many there are.
@@ -91,6 +110,9 @@ def link_leaves(leaves, interpretations):
     middles, halves, angles = np.empty((count, 3, 3)), np.empty((count, 3)), np.empty(count)
     space = (np.empty((3, 3)), np.empty((3, 3)), np.empty(3))
     view_leaves(leaves, middles, halves, angles, space[0])
+    inverses, shifts = np.empty((count, 3, 3)), np.empty((count, 3))
+    for m in range(count):
+        shift_of(leaves.rotations[m], leaves.translations[m], mean, radius, inverses[m], shifts[m])
     found = 0
     waiting = np.empty(count, np.int64)
     for seed in range(count):
@@ -105,7 +127,11 @@ def link_leaves(leaves, interpretations):
                 if (
                     labels[other] < 0
                     and interpretations[other] == interpretations[m]
-                    and overlap(m, other, leaves, middles, halves, angles, space)
+                    and (
+                        overlap(m, other, leaves, middles, halves, angles, space)
+                        or within(m, leaves, inverses[other], shifts[other], space[2])
+                        or within(other, leaves, inverses[m], shifts[m], space[2])
+                    )
                 ):
                     labels[other] = found
                     waiting[height] = other
@@ -143,20 +169,6 @@ def _join_undecided(leaves, interpretations, labels, into, names):
             left += 1
         labels[m] = names[k]
     return left
-
-
-@borrowing
-def within(at, leaves, rotation, shift, g):
-    """Whether a pose, world to object, with a shift in radii, is in a leaf's box."""
-    for k in range(3):
-        if not leaves.rooms[at, k, 0] <= shift[k] <= leaves.rooms[at, k, 1]:
-            return False
-    if not gibbs_between(leaves.charts[at], rotation, g):
-        return False
-    inside = True
-    for k in range(3):
-        inside &= leaves.lows[at, k] <= g[k] <= leaves.highs[at, k]
-    return inside
 
 
 @borrowing

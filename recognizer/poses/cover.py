@@ -31,6 +31,8 @@ DEEP = 240
 turn or shift until rounding ends it."""
 STEPS = 10_000
 """Nodes between two looks at the limits: about a tenth of a second."""
+UPRIGHT = 2
+"""The axis across the plane."""
 MOST_LEAVES = 256
 """Leaves that are written at once."""
 
@@ -55,8 +57,6 @@ class Aims(NamedTuple):
 
     spare: int
     """How many contacts may be on none of the features."""
-    crowd: float
-    """Ways to assign what is left up to which they are tried one by one."""
     coarse: float
     """How far turns about a box's axis may move contacts, in radii, when features are tried."""
     turns: int
@@ -164,6 +164,8 @@ def search_cover(
     work = work_space(n, directions, problem.touches.mean, problem.known)
     stack.domains[0] = domains
     stack.rooms[0] = -np.inf, np.inf
+    if problem.shape.flat:
+        stack.rooms[0, UPRIGHT] = 0.0
     tables = problem.tables
     begin(problem.contacts, tables.errors, tables.readings, stack.domains[0], stack.sizes[0])
     counts = np.zeros(COUNTS, np.int64)

@@ -47,8 +47,9 @@ REPEATS = 3
 """Times that a box is tightened and features are dropped in what is left of it, ..."""
 NARROWED = 0.9
 """... as long as less than this share of its longest side is left."""
-CHARTS = 4
-"""Boxes of Gibbs vectors that together are all rotations: about none and half a turn each axis."""
+CHARTS, UPRIGHT = 4, 2
+"""Boxes of Gibbs vectors that together are all rotations: about none and half a turn each axis;
+those that are all rotations about the last axis."""
 GONE, BRANCHES, BOXED, ASSIGNED = -2, -1, 0, 1
 """No pose is left of a node; a contact is to be assigned; it has a box; all contacts are assigned
 in it."""
@@ -108,24 +109,30 @@ def place_boxes(top, problem, stack, work):
         How many nodes are in its place then, each with a box; none if no rotation is left, and
         `BRANCHES` if more contacts have to be assigned first.
     """
-    aims = problem.aims
-    _, still, ways = count_open(top, stack)
+    _, still = count_open(top, stack)
     turns = first_boxes(stack.fixed[top], problem.shape, problem.touches, work)
     if turns == IMPOSSIBLE:
         return 0
-    if still > 0 and (turns > aims.turns or (aims.turns == 0 and ways <= aims.crowd)):
+    if still > 0 and turns > problem.aims.turns:
         return BRANCHES
-    boxes = CHARTS if turns == ALL else turns + 1
+    flat = problem.shape.flat
+    boxes = turns + 1
+    if turns == ALL:
+        boxes = UPRIGHT if flat else CHARTS
     for at in range(boxes):
         if at + 1 < boxes:
             copy_node(top + at, top + at + 1, stack)
+        # Of the plane are the first and the last.
+        chart = at * (CHARTS - 1) if flat else at
         for a in range(3):
-            side = 1.0 if turns == ALL else work.sides[at, a]
+            side = work.sides[at, a]
+            if turns == ALL:
+                side = 0.0 if flat and a < 2 else 1.0
             stack.lows[top + at, a], stack.highs[top + at, a] = -side, side
             for b in range(3):
                 stack.charts[top + at, a, b] = 0.0 if turns == ALL else work.charts[at, a, b]
             if turns == ALL:
-                stack.charts[top + at, a, a] = 1.0 if at in (0, a + 1) else -1.0
+                stack.charts[top + at, a, a] = 1.0 if chart in (0, a + 1) else -1.0
         stack.boxed[top + at] = turns > 0
     return boxes
 
@@ -135,10 +142,9 @@ def narrow_node(top, problem, stack, work):
     """Drop what a node's box doesn't allow, and shrink the box by what is assigned.
 
     Returns:
-        `GONE`; `ASSIGNED`; `BRANCHES` if few ways are left to assign the rest; else `BOXED`.
+        `GONE`; `ASSIGNED`; or `BOXED`, if features are left to choose.
     """
     shape, touches, aims = problem.shape, problem.touches, problem.aims
-    still, ways = 0, 1.0
     for _ in range(REPEATS):
         angle = view(top, stack, shape, touches, work)
         set_ways(touches.arms, work.directions, work.half, angle, work.ways)
@@ -148,17 +154,17 @@ def narrow_node(top, problem, stack, work):
                 return GONE
             if changed == 0:
                 break
-        assigned, still, ways = count_open(top, stack)
+        assigned, still = count_open(top, stack)
         if still == 0:
             return ASSIGNED
-        if assigned < FEWEST or angle > HANDY or ways <= aims.crowd:
+        if assigned < FEWEST or angle > HANDY:
             break
         share = tighten_turns(top, stack, problem, work)
         if share < 0.0:
             return GONE
         if share > NARROWED:
             break
-    return BRANCHES if ways <= aims.crowd else BOXED
+    return BOXED
 
 
 @borrowing
@@ -211,7 +217,7 @@ def step(top, found, problem, stack, leaves, counts, work):
             return 2, False
     view(top, stack, problem.shape, problem.touches, work)
     axis, far = widest(top, stack, problem.touches, work)
-    if outcome != ASSIGNED and (outcome == BRANCHES or far <= aims.coarse):
+    if outcome != ASSIGNED and far <= aims.coarse:
         branch(top, aims.spare, stack, problem.touches)
         return 1, False
     split(top, axis, stack)

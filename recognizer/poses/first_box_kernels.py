@@ -17,6 +17,8 @@ WIDE = 0.32
 """Squared sine of half an angle: the normals leave a turn about an axis open if they allow more."""
 ROUNDING = 1e-6
 """Misfit of normals, in squared bounds, that is put down to rounding."""
+FAR = 1e6
+"""A share of the misfit that no slack reaches."""
 IMPOSSIBLE, ALL = -1, 3
 """Of turns that are open: no rotation is within the bounds; all are."""
 
@@ -114,6 +116,12 @@ def first_boxes(fixed, shape, touches, work):
     for a in range(4):
         for b in range(a):
             form[a, b] = form[b, a]
+    if shape.flat:
+        # Quaternions of turns about z have no other parts.
+        for a in (1, 2):
+            for b in range(4):
+                form[a, b] = form[b, a] = 0.0
+            form[a, a] = -FAR * total
     diagonalise(form, vectors)
     best = 0
     for k in range(1, 4):
@@ -133,4 +141,7 @@ def first_boxes(fixed, shape, touches, work):
     box_about(best, along, slack, form, vectors, work.charts[0], work.sides[0])
     if turns == 1:
         box_about(along, best, slack, form, vectors, work.charts[1], work.sides[1])
+    if shape.flat:
+        for at in range(turns + 1):
+            work.sides[at, 0] = work.sides[at, 1] = 0.0
     return turns

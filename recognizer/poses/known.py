@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from ..contacts.contacts import APPROACH_ERROR, Contacts
 from ..contacts.free_space import FreeSpace
 from ..contacts.support import StableFace, SupportPlane
-from .solid import SolidEntry
+from .entry import Entry, SolidEntry
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -94,7 +94,7 @@ def nothing_known(count: int) -> Known:
 
 
 def known_of(
-    entry: SolidEntry,
+    entry: Entry,
     contacts: Contacts,
     surroundings: Surroundings,
     upright: Floats,
@@ -104,7 +104,7 @@ def known_of(
     """What is known, as the kernels read it.
 
     Args:
-        entry: the solid.
+        entry: the model.
         contacts: what was felt, turned by ``upright``.
         surroundings: what is known besides, not turned.
         upright: (3, 3) a rotation of the world.
@@ -112,7 +112,7 @@ def known_of(
             contact's feature; or the only one, if ``square`` is `NOWHERE`.
         square: the feature that stands for the plane of the first.
     """
-    known, free, model = nothing_known(len(contacts)), surroundings.free_space, entry.model
+    known, free, model = nothing_known(len(contacts)), surroundings.free_space, entry.body
     if surroundings.says_nothing(contacts):
         return known
     known = known._replace(
@@ -128,7 +128,7 @@ def known_of(
         bound=float(np.linalg.norm(model.vertices - model.centroid, axis=1).max()),
     )
     support = surroundings.support
-    if support is None:
+    if support is None or not isinstance(entry, SolidEntry):
         return known
     corners = entry.corners
     low, high = support.height - support.error, support.height + support.error

@@ -12,13 +12,13 @@ from __future__ import annotations
 import numpy as np
 
 from ..compiling import borrowing
-from .boxes_kernels import gibbs_between, shift_of, turn_chart
 from .motions.motion_kernels import copy_pose
 from .node_kernels import view
 from .path_kernels import heed_paths
 from .polytope_kernels import tighten
+from .seeking_kernels import end_pose, seek_inside, seek_nearby, spreads
 from .shrink_kernels import cut_rows, keep_box, note_cuts, rows_of, set_box
-from .witness_kernels import CONTACTS, NONE, POLYGONS, WITNESS, seek_witness
+from .witness_kernels import CONTACTS, NONE, POLYGONS, WITNESS
 
 NODES, TRIED, HEIGHT, CUT = 0, 1, 2, 3
 """Places of counts: nodes looked at; searches for a witness; how many nodes are on the stack;
@@ -42,10 +42,10 @@ FINEST = 0.02
 PATIENCE, POOL = 60, 400
 """Boxes that contacts allow, and that are cut for what else is known: of one interpretation, and of
 all together."""
+LINEAR = 1.0
+"""Bounds that linearising may leave out of a box in which a witness is sought by programs, too."""
 LOOSE = 0.1
 """Bounds of what is known besides contacts, that a box without a witness may be wide."""
-NEARBY = 1e-6
-"""Radians, and radii: a box may be a point."""
 
 
 @borrowing
@@ -73,86 +73,6 @@ def alike(top, angle, stack, aims):
     for k in range(3):
         shift += (stack.rooms[top, k, 1] - stack.rooms[top, k, 0]) ** 2
     return angle < aims.turn and 0.5 * np.sqrt(shift) < aims.shift
-
-
-@borrowing
-def end_pose(z, shape, work):
-    """The pose, object to world, of a turn about the box's middle and a shift, (6,) together."""
-    q = work.other
-    turn_chart((0.5 * z[0], 0.5 * z[1], 0.5 * z[2]), work.middle, work.turn, q)
-    for a in range(3):
-        work.translation[a] = work.mean[a]
-        for b in range(3):
-            work.rotation[a, b] = q[b, a]
-            work.translation[a] -= shape.radius * q[b, a] * z[3 + b]
-
-
-@borrowing
-def seek_from(z, heeding, top, problem, stack, work):
-    """A witness of a node, sought from a turn about the box's middle and a shift, (6,) together.
-
-    It breaks nothing else that is known, if that is heeded.
-
-    Returns:
-        See `witness_kernels.seek_witness`.
-    """
-    end_pose(z, problem.shape, work)
-    return seek_witness(
-        stack.fixed[top],
-        stack.targets[top],
-        problem.contacts,
-        problem.model,
-        problem.known,
-        heeding and problem.known.anything,
-        work.rotation,
-        work.translation,
-        work.seeking,
-    )
-
-
-@borrowing
-def coordinates(rotation, translation, radius, work, z):
-    """A pose, object to world, as a turn about the box's middle and a shift, (6,) in place.
-
-    Returns:
-        Whether it has them: not half a turn away.
-    """
-    shift_of(rotation, translation, work.mean, radius, work.turn, z[3:])
-    known = gibbs_between(work.middle, work.turn, z)
-    for a in range(3):
-        z[a] *= 2.0
-    return known
-
-
-@borrowing
-def spreads(top, problem, stack, work):
-    """Whether a pose within the bounds on contacts is farther from the witness than alike.
-
-    What else is known is not asked here: a box is then told as wider than it is. The pose is sought
-    from twice as far, along each axis along which the box is so wide.
-    """
-    shape, aims = problem.shape, problem.aims
-    z, least = work.objective, 1.0 + 2.0 * np.cos(aims.turn)
-    for k in range(6):
-        step = 2.0 * (aims.turn if k < 3 else aims.shift)
-        if work.high[k] - work.low[k] < step:
-            continue
-        for side in (-1.0, 1.0):
-            coordinates(work.best, work.shift, shape.radius, work, z)
-            z[k] += side * step
-            if seek_from(z, False, top, problem, stack, work) != WITNESS:
-                continue
-            trace, square = 0.0, 0.0
-            for a in range(3):
-                moved = 0.0
-                for b in range(3):
-                    trace += work.best[a, b] * work.rotation[a, b]
-                    moved += work.rotation[b, a] * (work.mean[b] - work.translation[b])
-                    moved -= work.best[b, a] * (work.mean[b] - work.shift[b])
-                square += moved * moved
-            if trace < least or np.sqrt(square) > aims.shift * shape.radius:
-                return True
-    return False
 
 
 @borrowing
@@ -187,47 +107,6 @@ def emit(top, proven, at, stack, leaves, work):
         for j in range(n):
             work.latest[j] = stack.fixed[top, j]
         work.latest[n] = PATIENCE
-
-
-@borrowing
-def seek_inside(top, near, problem, stack, counts, work):
-    """A witness from inside the polytope, which its box's middle need not be.
-
-    Args:
-        top: the node.
-        near: whether one far outside the box is another's witness. It isn't in a box so wide that
-            its poses are told as a family, whichever they are.
-        problem: see `cover.Problem`.
-        stack: see `cover.Stack`.
-        counts: see `NODES`.
-        work: see `work_space.Work`.
-
-    Returns:
-        See `witness_kernels.seek_witness`; `CONTACTS` if there is one, but not near.
-    """
-    counts[TRIED] += 1
-    for k in range(6):
-        work.objective[k] = 0.5 * (work.low[k] + work.high[k])
-        if work.sum[6] > 0.0:
-            work.objective[k] = work.sum[k] / work.sum[6]
-    found = seek_from(work.objective, True, top, problem, stack, work)
-    if found == WITNESS:
-        if near and not is_near(problem.shape.radius, work):
-            return CONTACTS
-        copy_pose(work.rotation, work.translation, work.best, work.shift)
-    return found
-
-
-@borrowing
-def is_near(radius, work):
-    """Whether a pose is in a box, or no farther from it than that is wide."""
-    if not coordinates(work.rotation, work.translation, radius, work, work.objective):
-        return False
-    for k in range(6):
-        away = abs(work.objective[k] - 0.5 * (work.high[k] + work.low[k]))
-        if away > 1.5 * (work.high[k] - work.low[k]) + NEARBY:
-            return False
-    return True
 
 
 @borrowing
@@ -305,7 +184,10 @@ def settle_leaf(top, at, problem, stack, leaves, counts, work):
             if not heed_paths(problem, work):
                 return GONE
         if found != WITNESS and (found != CONTACTS or share > STUCK):
-            found = seek_inside(top, handy, problem, stack, counts, work)
+            counts[TRIED] += 1
+            found = seek_inside(top, handy, problem, stack, work)
+            if found < CONTACTS and coarse < LINEAR:
+                found = max(found, seek_nearby(top, handy, problem, stack, work))
         if found == WITNESS:
             if coarse > FINE and not alike(top, angle, stack, aims):
                 if handy and share < SHRINKS and turn < ROUNDS:

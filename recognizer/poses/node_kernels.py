@@ -165,16 +165,15 @@ def view(top, stack, shape, touches, work):
 
 @borrowing
 def count_open(top, stack):
-    """How many contacts are assigned a feature, how many are open, and the ways they have."""
-    assigned, still, ways = 0, 0, 1.0
+    """How many contacts are assigned a feature, and how many are open."""
+    assigned, still = 0, 0
     for j in range(stack.fixed.shape[1]):
         f = stack.fixed[top, j]
         if f >= 0:
             assigned += 1
         elif f == OPEN:
             still += 1
-            ways *= stack.sizes[top, j]
-    return assigned, still, ways
+    return assigned, still
 
 
 @borrowing

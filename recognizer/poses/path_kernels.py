@@ -135,7 +135,7 @@ def _cut_exit(place, far, clearance, problem, work):
         for a in range(3):
             arm += work.rotation[k, a] * place[a]
         work.cut_arms[at, k] = arm / radius
-        work.cuts[at, k] = -normals[exit_face, k]
-    work.cuts[at, 3] = -(offsets[exit_face] + clearance) / radius + ROUNDING
+        work.cuts[at, k] = work.cuts[at, 3 + k] = -normals[exit_face, k]
+    work.cuts[at, 6] = -(offsets[exit_face] + clearance) / radius + ROUNDING
     work.cut_count[0] += 1
     return found

@@ -38,6 +38,8 @@ def tighten(first, last, count, work):
     most = 0.0
     for k in range(first, last):
         before = high[k] - low[k]
+        if before == 0.0:
+            continue
         for side in range(2):
             if side == 1 and seen[k, 1] >= high[k] - NEAR * before:
                 continue
@@ -58,5 +60,5 @@ def tighten(first, last, count, work):
                     work.sum[j] += vertex[j]
                     seen[j, 0] = min(seen[j, 0], vertex[j])
                     seen[j, 1] = max(seen[j, 1], vertex[j])
-        most = max(most, (high[k] - low[k]) / before if before > 0.0 else 1.0)
+        most = max(most, (high[k] - low[k]) / before)
     return most

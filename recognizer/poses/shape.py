@@ -46,6 +46,8 @@ class Shape(NamedTuple):
     """(f, d, 2) the extent of each feature's hull along each direction."""
     radius: float
     """Metres."""
+    flat: bool
+    """Whether poses are of the plane: turns about z, shifts across it."""
 
 
 class Touches(NamedTuple):
@@ -81,12 +83,13 @@ def touches_of(contacts: Contacts, radius: float) -> Touches:
     )
 
 
-def shape_of(features: Features, radius: float) -> Shape:
+def shape_of(features: Features, radius: float, *, flat: bool = False) -> Shape:
     """Features as the kernels read them.
 
     Args:
         features: of a solid.
         radius: what lengths are taken over, metres.
+        flat: whether poses are of the plane.
     """
     corners = features.corners / radius
     start = features.start
@@ -126,6 +129,7 @@ def shape_of(features: Features, radius: float) -> Shape:
         directions,
         np.ascontiguousarray(slabs),
         float(radius),
+        flat,
     )
 
 

@@ -9,11 +9,14 @@ from __future__ import annotations
 import numpy as np
 
 from ..compiling import borrowing
+from ..contacts.reading_kernels import ARC, NO_CONE
 from .breach_kernels import stands_on
 from .polytope_kernels import tighten
 from .rows_kernels import add_row, contact_rows, support_rows
 
-NEAR = 0.5
+TINY = 1e-12
+"""The square of a direction that is none."""
+NEAR = 0.9
 """Gaps of less, in bounds, give no cut."""
 
 
@@ -45,36 +48,54 @@ def cut_rows(used, work):
     """The rows of cuts, behind ``used`` others; returns how many there are then."""
     for c in range(work.cut_count[0]):
         cut = work.cuts[c]
-        used = add_row(work.cut_arms[c], cut, cut, cut[3], work, used)
+        used = add_row(work.cut_arms[c], cut, cut[3:6], cut[6], work, used)
     return used
 
 
 @borrowing
 def note_cuts(top, problem, stack, work):
-    """Cuts from where a search for a witness ended.
+    """Cuts from where a search for a witness ended; what finds no room is left out.
 
     A contact is within its bound of a polygon, so of the polygon's support in any direction; in
-    that of its gap this says most.
+    that of its gap this says most. Of a normal outside a cone, the same is so of its sine
+    across the nearest normal of the cone: no other one leans farther that way.
     """
-    radius, reaches = problem.shape.radius, problem.touches.reaches
-    gaps, lengths = work.seeking[0][0], work.seeking[0][1]
+    radius, touches, nearest = problem.shape.radius, problem.touches, work.lever
+    gaps, lengths, _, _, kinds, misses, directions = work.seeking[0]
+    u = work.seeking[2]
     start, corners = problem.model[3], problem.model[4]
-    for i in range(len(reaches)):
-        at, polygon = work.cut_count[0], stack.targets[top, i]
-        if stack.fixed[top, i] < 0 or lengths[i] < NEAR * reaches[i] * radius:
+    for i in range(len(touches.reaches)):
+        f, polygon = stack.fixed[top, i], stack.targets[top, i]
+        if f < 0:
             continue
-        if at == len(work.cuts):
-            return
-        cut = work.cuts[at]
-        for k in range(3):
-            cut[k] = gaps[i, k] / lengths[i]
-            work.cut_arms[at, k] = problem.touches.arms[i, k]
-        most = -np.inf
-        for c in range(start[polygon], start[polygon + 1]):
-            along = cut[0] * corners[c, 0] + cut[1] * corners[c, 1] + cut[2] * corners[c, 2]
-            most = max(most, along)
-        cut[3] = most / radius + reaches[i]
-        work.cut_count[0] += 1
+        at = work.cut_count[0]
+        if at < len(work.cuts) and lengths[i] > NEAR * touches.reaches[i] * radius:
+            cut = work.cuts[at]
+            for k in range(3):
+                cut[k] = cut[3 + k] = gaps[i, k] / lengths[i]
+                work.cut_arms[at, k] = touches.arms[i, k]
+            most = -np.inf
+            for c in range(start[polygon], start[polygon + 1]):
+                along = cut[0] * corners[c, 0] + cut[1] * corners[c, 1] + cut[2] * corners[c, 2]
+                most = max(most, along)
+            cut[6] = most / radius + touches.reaches[i]
+            at += 1
+        sine = np.sin(touches.errors[i])
+        known = touches.errors[i] < 0.5 * np.pi and kinds[i] != NO_CONE
+        if at < len(work.cuts) and known and misses[i] > NEAR * sine:
+            cut, square, along = work.cuts[at], 0.0, 0.0
+            for k in range(3):
+                nearest[k] = u[i, k] - misses[i] * directions[i, k] if kinds[i] != ARC else 0.0
+                along += directions[i, k] * nearest[k]
+            for k in range(3):
+                cut[k], cut[3 + k] = directions[i, k] - along * nearest[k], 0.0
+                square += cut[k] * cut[k]
+                work.cut_arms[at, k] = touches.normals[i, k]
+            for k in range(3):
+                cut[k] /= np.sqrt(max(square, TINY))
+            cut[6] = sine
+            at += square > TINY
+        work.cut_count[0] = at
 
 
 @borrowing
@@ -85,8 +106,10 @@ def keep_box(top, stack, work):
     """
     before, after, square = 1.0, 1.0, 1.0
     for k in range(3):
-        before *= stack.highs[top, k] - stack.lows[top, k]
-        after *= 0.5 * (work.high[k] - work.low[k])
+        # Turns about no more than one axis have no volume: other axes count nothing.
+        if stack.highs[top, k] > stack.lows[top, k]:
+            before *= stack.highs[top, k] - stack.lows[top, k]
+            after *= 0.5 * (work.high[k] - work.low[k])
         square += (0.5 * (stack.highs[top, k] + stack.lows[top, k])) ** 2
     # A volume of Gibbs vectors counts by this as one of rotations.
     fewer = after < before / (square * square)

@@ -17,7 +17,7 @@ from .motions.motion_kernels import add_row, copy_pose, move, slope_row, solve
 
 NONE, POLYGONS, CONTACTS, WITNESS = 0, 1, 2, 3
 """What a search for a witness came to."""
-SHARES = np.array([0.7, 0.9, 0.98, 1.0])
+SHARES = np.array([0.8, 1.0])
 """Of the bounds, that are aimed at in turn, ..."""
 STEPS = 10
 """... with so many steps each."""

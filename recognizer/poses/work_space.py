@@ -14,7 +14,7 @@ Ints = NDArray[np.int64]
 
 ROWS = 28
 """Rows of a contact, on average, that there is room for; what finds none is left out."""
-CUTS = 4
+CUTS = 12
 """Cuts of a contact, likewise."""
 
 
@@ -39,6 +39,8 @@ class Work(NamedTuple):
     low: Floats
     """(6,) a box: turns about the middle, radians, then shifts, radii."""
     high: Floats
+    kept: Floats
+    """(6, 2) the box while another is looked at."""
     columns: Floats
     """(7, m) rows and limits."""
     latest: Ints
@@ -55,9 +57,10 @@ class Work(NamedTuple):
     sum: Floats
     """(7,) see `polytope_kernels.tighten`."""
     cut_arms: Floats
-    """(c, 3) places about the contacts' mean, in radii, ..."""
+    """(c, 3) places about the contacts' mean, in radii, or normals, ..."""
     cuts: Floats
-    """(c, 4) ... directions, and how far out along them each can be."""
+    """(c, 7) ... directions, the same where shifts count and else zero, and how far out along them
+    each can be."""
     cut_count: Ints
     """(1,)"""
     rotation: Floats
@@ -107,6 +110,7 @@ def work_space(n: int, directions: int, mean: Floats, known: Known | None = None
         hull=empty((directions, 2)),
         low=empty(6),
         high=empty(6),
+        kept=empty((6, 2)),
         columns=empty((7, rows)),
         latest=np.zeros(n + 2, np.int64),
         still=np.zeros(3),
@@ -121,7 +125,7 @@ def work_space(n: int, directions: int, mean: Floats, known: Known | None = None
         seen=empty((6, 2)),
         sum=empty(7),
         cut_arms=empty((cuts, 3)),
-        cuts=empty((cuts, 4)),
+        cuts=empty((cuts, 7)),
         cut_count=np.zeros(1, np.int64),
         rotation=empty((3, 3)),
         translation=empty(3),

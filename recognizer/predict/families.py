@@ -12,9 +12,9 @@ from ..belief import Belief
 from ..beliefs.hypotheses import Hypothesis
 from ..contacts.contacts import Contacts
 from ..contacts.support import SupportPlane
+from ..poses.entry import SolidEntry
 from ..poses.fits.pose import kernel_contacts
 from ..poses.known import nothing_known
-from ..poses.solid import SolidEntry
 from ..poses.work_space import seeking_space
 from .spread_kernels import DRAWS, LINES, spread_over_families
 

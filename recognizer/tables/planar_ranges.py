@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
+from ..models.features import Features
 from ..models.planar_kernels import segment_distances
 from ..models.polygon import Polygon
 from .planar_range_kernels import tilt_ranges
-from .ranges import ROUNDING
+from .ranges import ROUNDING, PairTables
 
 Floats = NDArray[np.float64]
 
@@ -70,6 +71,41 @@ class PlanarTables:
             tilt_min=tilt_min - ROUNDING,
             tilt_max=tilt_max + ROUNDING,
         )
+
+    def in_space(self, features: Features) -> PairTables:
+        """The same of the prism's sides, with angles that have no sign.
+
+        Args:
+            features: of the prism, see `models.prism.outline_features`.
+        """
+        nearest, farthest = _unsigned(self.tilt_min, self.tilt_max)
+        return PairTables(
+            distance_min=self.distance_min,
+            distance_max=self.distance_max,
+            angle=np.abs(self.angle),
+            component_min=self.component_min,
+            component_max=self.component_max,
+            tilt_min=nearest,
+            tilt_max=farthest,
+            half_angles=features.half_angles,
+            normals=features.normals,
+            hull_corners=features.corners[: features.start[len(features)]],
+            hull_start=features.start[: len(features) + 1],
+        )
+
+
+def _unsigned(first: Floats, last: Floats) -> tuple[Floats, Floats]:
+    """The least and the largest angle, without its sign, from one angle on to another."""
+    ends = np.abs(np.array([_wrapped(first), _wrapped(last)]))
+    turn = 2.0 * np.pi
+    ahead = np.floor(last / turn) >= first / turn
+    behind = np.floor((last - np.pi) / turn) >= (first - np.pi) / turn
+    return np.where(ahead, 0.0, ends.min(axis=0)), np.where(behind, np.pi, ends.max(axis=0))
+
+
+def _wrapped(angles: Floats) -> Floats:
+    """The same angles from -pi to pi."""
+    return np.mod(angles + np.pi, 2.0 * np.pi) - np.pi
 
 
 def _turns(normals: Floats) -> Floats:

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from ...envs.sensors.grid import TrueContacts
     from ...envs.sensors.noise import SensorNoise
     from ...recognizer import Contacts, PairTables, Polyhedron
+    from ...recognizer.poses.entry import SolidEntry
     from ...recognizer.poses.fits.pose import Poses
-    from ...recognizer.poses.solid import SolidEntry
 
 Stage = Literal["tree", "test", "memo"]
 """How far to go: the tree alone, the model test and transforms too, the memo's own test besides."""
@@ -105,7 +105,7 @@ class Prepared:
     def test(self, interpretations: NDArray[np.int32], contacts: Contacts) -> Poses:
         """The model test: those of some interpretations that a pose satisfies, with one each."""
         from ...recognizer import Constraints, PoseTolerance, SearchLimits
-        from ...recognizer.poses.solid_search import Aim, test_interpretations
+        from ...recognizer.poses.pose_search import Aim, test_interpretations
 
         tolerance, error = PoseTolerance(), float(contacts.position_error.max())
         shift = tolerance.distance(self.model.diameter, error)
@@ -117,7 +117,7 @@ class Prepared:
 def prepared(object_name: str) -> Prepared:
     """An object of the library, once a process."""
     from ...envs.library import load_library
-    from ...recognizer.poses.solid import SolidEntry
+    from ...recognizer.poses.entry import SolidEntry
 
     model = next(model for model in load_library() if model.name == object_name)
     return Prepared(SolidEntry.of(model, edges=False, folder=None))

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...recognizer import Belief, Constraints, Contacts
-from ...recognizer.poses.solid import SolidEntry
+from ...recognizer.poses.entry import SolidEntry
 from ...recognizer.tree.tree import spread_order
 from ...recognizer.tree.tree_kernels import pair_masks
 

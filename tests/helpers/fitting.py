@@ -7,10 +7,9 @@ from numpy.typing import NDArray
 
 from palpate.recognizer import Constraints, Contacts, PairTables, Polyhedron, SearchLimits
 from palpate.recognizer.models.features import Features, face_features
-from palpate.recognizer.poses.fits.pose import KernelModel, Poses
-from palpate.recognizer.poses.solid import SolidEntry
-from palpate.recognizer.poses.solid_search import Aim, test_interpretations
-from palpate.recognizer.tables.ranges import pack_tables
+from palpate.recognizer.poses.entry import SolidEntry
+from palpate.recognizer.poses.fits.pose import Poses
+from palpate.recognizer.poses.pose_search import Aim, test_interpretations
 
 
 class Fitter:
@@ -21,8 +20,7 @@ class Fitter:
     ) -> None:
         self.features = features or face_features(model)
         tables = PairTables.of(model, self.features)
-        kernel = KernelModel(model, self.features)
-        self.entry = SolidEntry(model, self.features, tables, kernel, pack_tables(tables))
+        self.entry = SolidEntry.made(model, self.features, tables)
         self.aim = Aim(
             Constraints(), SearchLimits(nodes=nodes), np.radians(3.0), 0.01 * model.diameter
         )

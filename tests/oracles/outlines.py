@@ -18,8 +18,8 @@ from scipy.optimize import linprog, minimize
 
 from palpate.assets.planar import PLANAR_NAMES, planar_corners
 from palpate.recognizer import Contacts
-from palpate.recognizer.beliefs.outline import PlanarEntry
 from palpate.recognizer.models.polygon import Polygon
+from palpate.recognizer.poses.entry import OutlineEntry
 from palpate.recognizer.tables.planar_ranges import PlanarTables
 
 INCH = 0.0254
@@ -59,8 +59,8 @@ def outline(name: str) -> Polygon:
 
 
 @cache
-def entry(name: str) -> PlanarEntry:
-    return PlanarEntry.of(outline(name))
+def entry(name: str) -> OutlineEntry:
+    return OutlineEntry.of(outline(name))
 
 
 # --- Samplers -------------------------------------------------------------------------------

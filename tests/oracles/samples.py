@@ -16,7 +16,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from palpate.envs.library import load_library
 from palpate.recognizer import Contacts, Polyhedron
 from palpate.recognizer.contacts.reading_kernels import carry, read
-from palpate.recognizer.models.features import Features, all_features
+from palpate.recognizer.models.features import Features, all_features, face_features
 from palpate.recognizer.poses.fits.fit_kernels import FitSpace, fit_space
 from palpate.recognizer.poses.fits.pose import KernelContacts, KernelModel, kernel_contacts
 
@@ -72,7 +72,10 @@ class Sample:
 
 
 TESTS = [
-    *((model, KernelModel(model)) for model in (*SMALL.values(), *STAND_INS.values())),
+    *(
+        (model, KernelModel(model, face_features(model)))
+        for model in (*SMALL.values(), *STAND_INS.values())
+    ),
     *(
         (model, KernelModel(model, all_features(model)))
         for model in (*SMALL.values(), STAND_INS["stapler"], STAND_INS["simple-hand"])

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...contacts.contacts import Contacts
-from ...models.features import Features, face_features
+from ...models.features import Features
 from ...models.polyhedron import Polyhedron
+from ...models.prism import Prism
 
 Floats = NDArray[np.float64]
 
@@ -88,14 +89,14 @@ class KernelModel:
     metres; (f + 1,) the first normal of each feature's cone; normals (k, 3).
     """
 
-    def __init__(self, model: Polyhedron, features: Features | None = None) -> None:
+    def __init__(self, model: Polyhedron | Prism, features: Features) -> None:
         """Prepare a model.
 
         Args:
             model: the object.
-            features: what of it contacts may lie on; its faces by default.
+            features: what of it contacts may lie on.
         """
-        self.features = features = features or face_features(model)
+        self.features = features
         self.radius = model.diameter / 2.0
         self.model = (
             features.normals,

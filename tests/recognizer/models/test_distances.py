@@ -25,7 +25,7 @@ every_solid = pytest.mark.parametrize("name", [*SMALL, *OTHERS])
 
 def kernel_distances(model: Polyhedron, points: Floats) -> tuple[Floats, Floats]:
     """Signed distances (n,) and nearest points (n, 3) of the surface, from the kernels."""
-    packed = KernelModel(model).model
+    packed = KernelModel(model, face_features(model)).model
     nearest = np.empty((len(points), 3))
     distances = [
         signed_distance(point, packed, model.face_count, found)
@@ -99,7 +99,7 @@ def walk(
         clearance,
         grain,
         bound,
-        KernelModel(model).model,
+        KernelModel(model, face_features(model)).model,
         model.face_count,
         place,
         np.empty(3),
@@ -189,7 +189,7 @@ def test_a_path_through_a_hole_meets_its_walls_at_their_distance() -> None:
 
 
 def test_a_place_outside_is_not_taken_for_one_inside_that_has_to_leave() -> None:
-    model = KernelModel(CUBE).model
+    model = KernelModel(CUBE, face_features(CUBE)).model
     top = CUBE.vertices[:, 2].max()
     for height, clearance, after in (
         (1e-5, -1e-6, 1.0),

@@ -15,7 +15,7 @@ from scipy.spatial.transform import RigidTransform, Rotation
 from palpate.recognizer import Contacts, Hypothesis, Polyhedron, Recognizer
 from palpate.recognizer.poses.component_kernels import link_leaves
 from palpate.recognizer.poses.cover import Aims, Cover, Leaves, problem_of, search_cover
-from palpate.recognizer.poses.solid import SolidEntry, bit_set
+from palpate.recognizer.poses.entry import SolidEntry, bit_set
 from palpate.recognizer.tree.tree import Constraints
 
 Floats = NDArray[np.float64]
@@ -50,7 +50,7 @@ def cover_of(
     """The cover of all poses, over all features or those of one interpretation."""
     largest = float(contacts.position_error.max()) / entry.shape.radius
     turns = 3 if (contacts.normal_error > 1.0).all() else 0
-    aims = Aims(spare, 1.0, max(5.0 * largest, 0.1), turns, 0.05, max(0.02, 2.0 * largest))
+    aims = Aims(spare, max(5.0 * largest, 0.1), turns, 0.05, max(0.02, 2.0 * largest))
     problem = problem_of(
         entry.shape, entry.kernel.model, entry.packed, contacts, Constraints().bits, aims
     )
@@ -197,28 +197,58 @@ def test_poses_that_are_known_are_no_farther_than_a_hypothesis_says() -> None:
         ), case
 
 
+@pytest.mark.parametrize("name", ["tetrahedron", "cube"])
+def test_a_symmetric_solid_keeps_every_piece_of_an_interpretations_poses(name: str) -> None:
+    """Positions alone: an interpretation often has poses in several pieces."""
+    rng = np.random.default_rng(15)
+    model = oracles.model(name)
+    recognizer, reach = Recognizer([model]), 0.01 * model.diameter
+    for case in range(40):
+        touches = touch_faces(model, rng, rng.integers(model.face_count, size=4).tolist())
+        contacts = forget_normals(feel(touches, rng, reach, 0.3), np.ones(4, bool))
+        truth, centre = touches.T_world_object, model.centroid
+        assert any(
+            nearest_turn(model, h, truth) <= h.farthest_turn + ROUNDING
+            and np.linalg.norm(h.pose.apply(centre) - truth.apply(centre))
+            <= h.farthest_shift + ROUNDING
+            and (h.interpretations == touches.faces).all(axis=1).any()
+            for h in recognizer.recognize(contacts)
+        ), case
+
+
 def test_leaves_are_one_component_only_if_a_way_leads_from_box_to_box() -> None:
-    def boxes(places: list[tuple[float, float]]) -> Leaves:
+    def boxes(places: list[tuple[float, float]], witnesses: list[tuple[float, float]]) -> Leaves:
         count = len(places)
         room = np.zeros((count, 3, 2))
         room[:, :, 1] = 1.0
         room[:, 0] = [(first, first + 1.0) for first, _ in places]
         turns = np.array([(turn, 0.0, 0.0) for _, turn in places])
+        angles = np.array([(2.0 * np.arctan(turn), 0.0, 0.0) for _, turn in witnesses])
+        shifts = np.array([(first + 0.5, 0.5, 0.5) for first, _ in witnesses])
+        inverses = Rotation.from_rotvec(angles)
         return Leaves(
             fixed=np.zeros((count, 1), np.int32),
             charts=np.tile(np.eye(3), (count, 1, 1)),
             lows=turns - 0.1,
             highs=turns + 0.1,
             rooms=room,
-            rotations=np.tile(np.eye(3), (count, 1, 1)),
-            translations=np.zeros((count, 3)),
+            rotations=inverses.inv().as_matrix(),
+            translations=-inverses.inv().apply(shifts),
             proven=np.ones(count, bool),
         )
 
-    def linked(places: list[tuple[float, float]], interpretations: list[int]) -> list[int]:
-        return link_leaves(boxes(places), np.array(interpretations))[0].tolist()
+    def linked(
+        places: list[tuple[float, float]],
+        interpretations: list[int],
+        witnesses: list[tuple[float, float]] | None = None,
+    ) -> list[int]:
+        leaves = boxes(places, witnesses or places)
+        return link_leaves(leaves, np.array(interpretations), np.zeros(3), 1.0)[0].tolist()
 
     row = [(0.0, 0.0), (0.5, 0.0), (1.2, 0.15), (0.0, 0.9)]
     assert linked(row, [0, 0, 0, 0]) == [0, 0, 0, 1]
     assert linked(row, [0, 1, 0, 0]) == [0, 1, 2, 3]
     assert linked(row[::-1], [0, 0, 0, 0]) == [0, 1, 1, 1]
+    # The last one's witness lies in the first box.
+    assert linked(row, [0, 0, 0, 0], [*row[:3], (0.1, 0.05)]) == [0, 0, 0, 0]
+    assert linked(row, [0, 0, 0, 1], [*row[:3], (0.1, 0.05)]) == [0, 0, 0, 1]

@@ -184,7 +184,7 @@ def test_what_free_paths_and_a_support_ask_holds_at_the_truth(kind: str) -> None
         feet = [] if kind != "standing" else _stood_on(entry.stable_faces, scene)
         surroundings = Surroundings.of(scene.free_space, scene.support)
         known = known_of(entry, scene.contacts, surroundings, np.eye(3), feet)
-        aims = Aims(0, 1.0, 0.1, 0, 0.05, 0.05)
+        aims = Aims(0, 0.1, 0, 0.05, 0.05)
         problem = problem_of(
             *(entry.shape, entry.kernel.model, entry.packed, scene.contacts, 0, aims), known
         )

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from oracles.outlines import SHAPES, entry, rotation, wrapped
 
-from palpate.recognizer.beliefs.outline import PlanarEntry
 from palpate.recognizer.models.polygon import Polygon
+from palpate.recognizer.poses.entry import OutlineEntry
 
 every_shape = pytest.mark.parametrize("name", SHAPES)
 
@@ -52,7 +52,7 @@ def test_tables_are_the_extremes_over_sampled_points(name):
 
 def test_the_tables_of_the_memos_triangle_are_those_it_prints():
     """The right triangle with sides 3, 4 and 5 (Section 1.2): ranges of distances."""
-    triangle = PlanarEntry.of(Polygon.from_corners([[0, 0], [4, 0], [0, 3]], name="3-4-5"))
+    triangle = OutlineEntry.of(Polygon.from_corners([[0, 0], [4, 0], [0, 3]], name="3-4-5"))
     four, five, three = 0, 1, 2
     tables = triangle.tables
     np.testing.assert_allclose(tables.distance_min, 0.0, atol=1e-7)

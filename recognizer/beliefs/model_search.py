@@ -1,4 +1,4 @@
-"""Recognition in space, for one solid: contacts in, weighted hypotheses out."""
+"""Recognition of one model: contacts in, weighted hypotheses out."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import RigidTransform, Rotation
 
 from ..contacts.contacts import Contacts
+from ..poses.entry import Entry
 from ..poses.fits.pose import kernel_contacts
 from ..poses.known import Surroundings, nothing_known
-from ..poses.solid import SolidEntry
-from ..poses.solid_search import Aim, find_poses
+from ..poses.pose_search import Aim, find_poses
 from ..poses.work_space import seeking_space
 from ..tree.limits import SearchLimits
 from ..tree.tree import Constraints
@@ -21,8 +21,8 @@ from .hypotheses import Hypothesis, PoseTolerance, cluster
 from .search import Search
 
 
-def search_solid(
-    entry: SolidEntry,
+def search_model(
+    entry: Entry,
     contacts: Contacts,
     constraints: Constraints,
     tolerance: PoseTolerance,
@@ -32,10 +32,10 @@ def search_solid(
     known: NDArray[np.int32] | None = None,
     surroundings: Surroundings | None = None,
 ) -> tuple[list[Hypothesis], NDArray[np.float64], Search]:
-    """The search and its groups of poses, for one solid.
+    """The search and its groups of poses, for one model.
 
     Args:
-        entry: the solid.
+        entry: the model.
         contacts: at least one contact, in the order of the search.
         constraints: which constraints on pairs prune the tree.
         tolerance: which poses count as the same.
@@ -48,19 +48,20 @@ def search_solid(
         Hypotheses; (h,) the logarithms of their weights, not yet normalised; and what was done.
     """
     started = perf_counter()
+    contacts = entry.in_space(contacts)
     largest = float(contacts.position_error.max())
     aim = Aim(
         constraints,
         limits,
         tolerance.rotation,
-        tolerance.distance(entry.model.diameter, largest),
+        tolerance.distance(entry.body.diameter, largest),
         outliers,
     )
     found = find_poses(entry, contacts, aim, surroundings or Surroundings.of(None, None), known)
     searched = perf_counter()
-    hypotheses, log_weights = cluster(entry.model, found.poses, tolerance, largest)
+    hypotheses, log_weights = cluster(entry.body, found.poses, tolerance, largest)
     search = Search(
-        object_name=entry.model.name,
+        object_name=entry.body.name,
         nodes=found.nodes,
         tried=found.tried,
         tested=len(found.poses),
@@ -72,8 +73,8 @@ def search_solid(
     return hypotheses, log_weights, search
 
 
-def span_solid(
-    entry: SolidEntry,
+def span_hypothesis(
+    entry: Entry,
     hypothesis: Hypothesis,
     contacts: Contacts,
     tolerance: PoseTolerance,
@@ -85,7 +86,7 @@ def span_solid(
     interpretation allows, outwards from its own pose as far as ``most`` reach.
 
     Args:
-        entry: the solid that the hypothesis is of.
+        entry: the model that the hypothesis is of.
         hypothesis: of a belief about these contacts.
         contacts: what was felt.
         tolerance: which poses count as the same.
@@ -96,8 +97,9 @@ def span_solid(
     """
     if hypothesis.determined:
         return RigidTransform.from_matrix(hypothesis.pose.as_matrix()[None])
+    contacts = entry.in_space(contacts)
     largest = float(contacts.position_error.max())
-    diameter = entry.model.diameter
+    diameter = entry.body.diameter
     step = 0.5 * min(tolerance.distance(diameter, largest), tolerance.rotation * diameter / 2.0)
     faces = hypothesis.interpretations[0]
     rotations, translations = np.empty((most, 3, 3)), np.empty((most, 3))

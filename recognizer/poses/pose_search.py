@@ -1,4 +1,4 @@
-"""The poses of one solid that contacts allow: a cover, as interpretations with poses."""
+"""The poses of one model that contacts allow: a cover, as interpretations with poses."""
 
 from __future__ import annotations
 
@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 from ..contacts.contacts import Contacts
 from ..contacts.support import StableFace
 from ..models.polyhedron import Polyhedron
+from ..models.prism import Prism
 from ..tree.limits import SearchLimits
 from ..tree.tree import Constraints
 from .component_kernels import link_leaves, report_components
 from .cover import Aims, problem_of, search_cover
+from .entry import Bits, Entry, SolidEntry, bit_set
 from .fits.pose import Poses
 from .known import NOWHERE, Surroundings, known_of
-from .solid import Bits, SolidEntry, bit_set
 from .work_space import seeking_space
 
 EXACT_SYMMETRY = 1e-7
@@ -67,22 +68,23 @@ class Found:
 
 
 def find_poses(
-    entry: SolidEntry,
+    entry: Entry,
     contacts: Contacts,
     aim: Aim,
     surroundings: Surroundings,
     known: NDArray[np.int32] | None = None,
 ) -> Found:
-    """Every interpretation of contacts with one solid that isn't ruled out, with poses.
+    """Every interpretation of contacts with one model that isn't ruled out, with poses.
 
     Args:
-        entry: the solid.
+        entry: the model.
         contacts: at least one contact, in the order of the search.
         aim: what to find out.
         surroundings: what else is known.
         known: (m, k) all interpretations of the first k contacts, if they are known.
     """
-    if surroundings.support is not None and surroundings.support.resting:
+    resting = surroundings.support is not None and surroundings.support.resting
+    if resting and isinstance(entry, SolidEntry):
         return _find_standing(entry, contacts, aim, surroundings, known)
     domains = _domains(entry, contacts, known)
     permutations, missed = entry.permutations
@@ -97,19 +99,19 @@ def find_poses(
     found = _find(entry, contacts, aim, domains, surroundings)
     poses = found.poses
     if symmetric:
-        poses = _spread_over_symmetries(entry.model, poses, permutations)
+        poses = _spread_over_symmetries(entry.body, poses, permutations)
     return replace(found, poses=poses)
 
 
 def test_interpretations(
-    entry: SolidEntry, interpretations: NDArray[np.int32], contacts: Contacts, aim: Aim
+    entry: Entry, interpretations: NDArray[np.int32], contacts: Contacts, aim: Aim
 ) -> Poses:
     """A pose of each of some interpretations that isn't ruled out, in their order.
 
     It is the best fit of one that meets every bound, if there is one.
 
     Args:
-        entry: the solid.
+        entry: the model.
         interpretations: (m, n) a feature for each contact, -1 for none.
         contacts: the n contacts.
         aim: what to find out; none of these is looked for among others.
@@ -125,7 +127,7 @@ def test_interpretations(
     return poses.take(np.array(kept, np.intp))
 
 
-def _domains(entry: SolidEntry, contacts: Contacts, known: NDArray[np.int32] | None) -> Bits:
+def _domains(entry: Entry, contacts: Contacts, known: NDArray[np.int32] | None) -> Bits:
     """(n, w) the features that each contact may be on."""
     domains = entry.by_kind[contacts.kinds]
     if known is not None:
@@ -135,7 +137,7 @@ def _domains(entry: SolidEntry, contacts: Contacts, known: NDArray[np.int32] | N
 
 
 def _find(
-    entry: SolidEntry,
+    entry: Entry,
     contacts: Contacts,
     aim: Aim,
     domains: Bits,
@@ -149,12 +151,11 @@ def _find(
         feet: faces of its hull that the solid may stand on, if it does.
         square: the feature that stands for the first, if the first contact says which it is.
     """
-    upright, contacts = _upright(contacts)
+    upright, contacts = (np.eye(3), contacts) if entry.flat else _upright(contacts)
     shape, model = entry.shape, entry.kernel.model
     largest = float(contacts.position_error.max()) / shape.radius
     aims = Aims(
         spare=aim.outliers,
-        crowd=float(aim.limits.crowd),
         coarse=max(COARSE * largest, COARSEST),
         turns=_open_turns(contacts),
         turn=aim.turn,
@@ -166,7 +167,7 @@ def _find(
         problem, domains, most_nodes=aim.limits.nodes, most_found=aim.limits.budget
     )
     leaves = cover.leaves
-    labels, count = link_leaves(leaves, cover.interpretations)
+    labels, count = link_leaves(leaves, cover.interpretations, problem.touches.mean, shape.radius)
     poses = Poses(
         *report_components(
             *(leaves, labels, count, problem),
@@ -271,15 +272,23 @@ def _open_turns(contacts: Contacts) -> int:
 
 
 def _spread_over_symmetries(
-    model: Polyhedron, poses: Poses, permutations: NDArray[np.int32]
+    model: Polyhedron | Prism, poses: Poses, permutations: NDArray[np.int32]
 ) -> Poses:
-    """Each interpretation as seen from every symmetry of the solid, with its pose."""
+    """Each interpretation as seen from every symmetry of the model, with all its poses."""
     if not len(poses):
         return poses
-    count, found = len(permutations), len(poses)
-    faces = permutations[:, poses.faces].reshape(count * found, -1)
-    faces, rows = np.unique(faces, axis=0, return_index=True)
-    which, of = np.divmod(rows, found)
+    rows, row_of = np.unique(poses.faces, axis=0, return_inverse=True)
+    images = permutations[:, rows].reshape(len(permutations) * len(rows), -1)
+    # One is seen from several symmetries, or from several of those that were found, where all are
+    # of one contact's feature: it has the poses of any of them.
+    faces, first = np.unique(images, axis=0, return_index=True)
+    turn_of, seen = np.divmod(first, len(rows))
+    sizes = np.bincount(row_of)
+    image = np.repeat(np.arange(len(faces)), sizes[seen])
+    within = np.arange(len(image)) - np.repeat(np.cumsum(sizes[seen]) - sizes[seen], sizes[seen])
+    starts = np.cumsum(sizes) - sizes
+    of = np.argsort(row_of, kind="stable")[starts[seen[image]] + within]
+    faces, which = faces[image], turn_of[image]
     turns = model.symmetries[which]
     rotations = poses.rotations[of] @ turns.transpose(0, 2, 1)
     centres = poses.translations[of] + poses.rotations[of] @ model.centroid
